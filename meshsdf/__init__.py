@@ -1,0 +1,1 @@
+"""Polygon meshes to exact signed distance volumes and back, with the loss proved."""

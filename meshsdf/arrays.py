@@ -1,0 +1,31 @@
+"""The named array types that signatures use, checked at every call in the tests.
+
+``n`` points, ``m`` faces. Points and what is computed on them are float64, stored volumes float32.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt64
+
+Points = Float64[np.ndarray, "n 3"]
+Values = Float64[np.ndarray, " n"]
+Vector3 = Float64[np.ndarray, "3"]
+Matrix4 = Float64[np.ndarray, "4 4"]
+
+Faces = Int32[np.ndarray, "m 3"]
+FaceValues = Float64[np.ndarray, " m"]
+FaceLabels = Int32[np.ndarray, " m"]
+FaceMask = Bool[np.ndarray, " m"]
+Indices = Int32[np.ndarray, " n"]
+Barycentrics = Float64[np.ndarray, "n 3"]
+
+Ijk = Int64[np.ndarray, "n 3"]
+Ijk1 = Int64[np.ndarray, "3"]
+NodeValues = Float32[np.ndarray, "i j k"]
+
+BrickValues = Float32[np.ndarray, "b 8 8 8"]
+BrickMasks = UInt64[np.ndarray, "b 8"]
+BrickFaces = Int32[np.ndarray, "b 8 8 8"]
+BrickBarycentrics = Float32[np.ndarray, "b 8 8 8 2"]
+BrickCoordinates = Int64[np.ndarray, "b 3"]
+RootTable = Int32[np.ndarray, "px py pz"]
+PageTable = Int32[np.ndarray, "p 16 16 16"]

@@ -1,0 +1,112 @@
+"""A narrow band: signed distances in 8^3 bricks where the surface passes, signs everywhere else.
+
+It maps one to one to a VDB level set: a brick is a leaf, its mask the leaf's active mask.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import (
+    BrickBarycentrics,
+    BrickFaces,
+    BrickMasks,
+    BrickValues,
+    Ijk,
+    Points,
+    Values,
+    Vector3,
+)
+from ..errors import GridError
+from ..kernels.brick_lookup import read_nodes
+from .brick_index import BRICK, BrickIndex
+
+
+@dataclass(frozen=True, eq=False)
+class NarrowBand:
+    """Distances within ``half_width`` voxels of a surface; node (i, j, k) lies at
+    ``voxel_size * (i, j, k) + translation``.
+
+    Attributes
+    ----------
+    index : BrickIndex
+        Which bricks exist; those that do not are outside or inside as a whole.
+    values : (b, 8, 8, 8) float32
+        World units, negative inside; +-background at nodes that are not active.
+    active : (b, 8) uint64
+        Bit ``8 j + k`` of word i is set where node (i, j, k) of the brick is active, that is,
+        nearer to the surface than the background.
+    voxel_size : float
+        World units.
+    translation : (3,) float64
+        World position of node (0, 0, 0).
+    half_width : float
+        In voxels.
+    sign : str
+        How inside was told: "parity", "winding" or "unsigned".
+    closest_face : (b, 8, 8, 8) int32 or None
+        Face of the mesh with the closest point; -1 at nodes that are not active.
+    barycentric : (b, 8, 8, 8, 2) float32 or None
+        Weights of the face's second and third corner at the closest point.
+    """
+
+    index: BrickIndex
+    values: BrickValues
+    active: BrickMasks
+    voxel_size: float
+    translation: Vector3
+    half_width: float
+    sign: str
+    closest_face: BrickFaces | None = None
+    barycentric: BrickBarycentrics | None = None
+
+    def __post_init__(self) -> None:
+        n = self.index.n_bricks
+        for name in ("values", "active", "closest_face", "barycentric"):
+            array = getattr(self, name)
+            if array is not None and len(array) != n:
+                raise GridError(
+                    f"{name} holds {len(array)} bricks, the index {n}",
+                    "NarrowBand(...)",
+                    "give one entry for every brick of the index",
+                )
+
+    @property
+    def is_signed(self) -> bool:
+        """Whether values are negative inside."""
+        return self.sign != "unsigned"
+
+    @property
+    def background(self) -> float:
+        """Magnitude of the value beyond the band, world units, as stored (float32)."""
+        return float(np.float32(self.half_width * self.voxel_size))
+
+    @property
+    def n_active(self) -> int:
+        """Number of active nodes."""
+        return int(np.bitwise_count(self.active).sum())
+
+    def active_mask(self) -> np.ndarray:
+        """Return the (b, 8, 8, 8) bool mask of active nodes."""
+        bits = np.unpackbits(self.active.astype("<u8").view(np.uint8), bitorder="little")
+        return bits.view(bool).reshape(-1, BRICK, BRICK, BRICK)
+
+    def active_ijk(self) -> Ijk:
+        """Return the (n, 3) int64 index coordinates of the active nodes, brick by brick."""
+        slot, i, j, k = np.nonzero(self.active_mask())
+        return self.index.coordinates[slot] * BRICK + np.stack([i, j, k], axis=1)
+
+    def active_values(self) -> Values:
+        """Return the (n,) values of the active nodes, in the order of `active_ijk`."""
+        return self.values[self.active_mask()].astype(np.float64)
+
+    def to_world(self, ijk: Ijk) -> Points:
+        """Return the (n, 3) world positions of nodes."""
+        return self.voxel_size * ijk + self.translation
+
+    def value_at(self, ijk: Ijk) -> Values:
+        """Return the (n,) values at nodes; +-background where there is no brick."""
+        local = np.ascontiguousarray(ijk - self.index.origin * BRICK)
+        out = np.empty(len(ijk))
+        read_nodes(self.index.root, self.index.pages, self.values, self.background, local, out)
+        return out

@@ -1,0 +1,47 @@
+"""A dense grid of values on nodes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from ..arrays import Vector3
+from ..errors import GridError
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Values at nodes ``origin + voxel_size * (i, j, k)``.
+
+    Attributes
+    ----------
+    values : (ni, nj, nk) float32 or float64
+        World units when they are distances, negative inside; NaN where there are no data.
+    voxel_size : float
+        World units.
+    origin : (3,) float64
+        World position of node (0, 0, 0).
+    sign : str
+        How inside was told: "parity", "winding" or "unsigned".
+
+    Raises
+    ------
+    GridError
+        The voxel size is not a positive number.
+    """
+
+    values: Float[np.ndarray, "i j k"]
+    voxel_size: float
+    origin: Vector3
+    sign: str = "parity"
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.voxel_size) and self.voxel_size > 0):
+            raise GridError(
+                f"voxel_size is {self.voxel_size}", "Grid(voxel_size=...)", "pass a length above 0"
+            )
+
+    @property
+    def is_signed(self) -> bool:
+        """Whether values are negative inside."""
+        return self.sign != "unsigned"

@@ -1,0 +1,1 @@
+"""mesh -> distance: bands and dense grids."""

@@ -1,0 +1,1 @@
+"""Queries on a mesh: closest points, winding numbers."""

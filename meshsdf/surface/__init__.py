@@ -1,0 +1,1 @@
+"""field -> mesh: marching squares and cubes, dual contouring."""
