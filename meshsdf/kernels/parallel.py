@@ -8,6 +8,7 @@ they are. Pieces write to disjoint places, so the outcome is the same with any n
 import os
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from itertools import pairwise
 
 from ..progress import Progress, silent
 
@@ -48,7 +49,7 @@ def run_pieces(
 
 
 def even_ranges(n_items: int, n_pieces: int) -> list[tuple[int, int]]:
-    """Split ``range(n_items)`` into at most ``n_pieces`` non-empty ranges of nearly equal length."""
+    """Split ``range(n_items)`` into at most ``n_pieces`` ranges of nearly equal length."""
     n_pieces = max(1, min(n_pieces, n_items))
     bounds = [n_items * piece // n_pieces for piece in range(n_pieces + 1)]
-    return list(zip(bounds[:-1], bounds[1:], strict=True))
+    return list(pairwise(bounds))

@@ -117,7 +117,8 @@ def _check_positions(vertices: np.ndarray) -> None:
     bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     place = vertices[bad[0]].tolist()
     raise MeshError(
-        f"{len(bad)} of {len(vertices)} vertices are NaN or infinite (first: vertex {bad[0]} at {place})",
+        f"{len(bad)} of {len(vertices)} vertices are NaN or infinite "
+        f"(first: vertex {bad[0]} at {place})",
         "Mesh(vertices=...)",
         "remove or repair those vertices in the program that wrote the mesh",
     )
