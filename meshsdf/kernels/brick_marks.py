@@ -1,0 +1,127 @@
+"""Find the bricks near a mesh: conservative marks, then slots in lexicographic order.
+
+A cell (a brick of 8 nodes or a page of 128) is marked when the box of its nodes, grown by the
+reach, meets the triangle's box, its plane and the three planes through its edges; no cell that
+holds a node within reach of the mesh is missed.
+"""
+
+import numpy as np
+from numba import njit
+
+from .brick_lookup import find_brick
+from .clip import clip_line, triangle_range
+
+
+@njit(cache=True, nogil=True)
+def bin_by_x(low, high, edges, start, items, n_items):
+    """CSR lists of the items whose [low, high] meets slab s = [edges[s], edges[s + 1]).
+
+    Two passes: with ``items`` empty it only counts into ``start`` (n_slabs + 1,); call again with
+    ``items`` of length ``start[-1]`` to fill.
+    """
+    n_slabs = len(edges) - 1
+    fill = len(items) > 0
+    place = start.copy()
+    if not fill:
+        start[:] = 0
+    for item in range(n_items):
+        first = max(0, np.searchsorted(edges, low[item], side="right") - 1)
+        last = min(n_slabs - 1, np.searchsorted(edges, high[item], side="right") - 1)
+        for s in range(first, last + 1):
+            if fill:
+                items[place[s]] = item
+                place[s] += 1
+            else:
+                start[s + 1] += 1
+    if not fill:
+        for s in range(n_slabs):
+            start[s + 1] += start[s]
+
+
+@njit(cache=True, nogil=True)
+def extents_x(points, corners, reach, low, high):
+    """``low[n], high[n]`` = x extent of the points named by ``corners[n]``, grown by reach."""
+    for n in range(len(corners)):
+        x0, x1 = np.inf, -np.inf
+        for c in range(corners.shape[1]):
+            x = points[corners[n, c], 0]
+            x0, x1 = min(x0, x), max(x1, x)
+        low[n], high[n] = x0 - reach, x1 + reach
+
+
+@njit(cache=True, nogil=True)
+def mark_cells(points, faces, ids, reach, shift, cell0, cell1, root, pages):
+    """Mark every cell with x coordinate in [cell0, cell1) that is near one of the faces ``ids``.
+
+    Cells have ``2**shift`` nodes a side: with shift 7 ``root`` is marked (0), with shift 3 the
+    entries of ``pages`` (0). Coordinates are local to the root table.
+    """
+    side = 1 << shift
+    half = 0.5 * (side - 1)
+    for n in range(len(ids)):
+        a, b, c = points[faces[ids[n], 0]], points[faces[ids[n], 1]], points[faces[ids[n], 2]]
+        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        wx, wy, wz = vx - ux, vy - uy, vz - uz
+        longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz)
+        longest = max(longest, wx * wx + wy * wy + wz * wz)
+        area = np.sqrt(nx * nx + ny * ny + nz * nz)
+        flat = area > 1e-5 * longest  # else the normal is not worth testing
+        if flat:
+            nx, ny, nz = nx / area, ny / area, nz / area
+        grown = reach + half + 1e-6
+        x0 = max(cell0, np.int64(np.floor((min(a[0], b[0], c[0]) - reach)) - side + 1) // side)
+        x1 = min(cell1 - 1, np.int64(np.floor((max(a[0], b[0], c[0]) + reach))) // side)
+        z_min, z_max = min(a[2], b[2], c[2]) - grown, max(a[2], b[2], c[2]) + grown
+        # Centre (cx, cy, cz) of a cell may lie this far from the plane of the face
+        thick = reach + half * (abs(nx) + abs(ny) + abs(nz)) + 1e-6
+        for x in range(x0, x1 + 1):
+            cx = x * side + half
+            y_min, y_max = triangle_range(
+                a[0], a[1], b[0], b[1], c[0], c[1], cx - grown, cx + grown
+            )
+            if y_min > y_max:
+                continue
+            y0 = max(0, np.int64(np.floor((y_min - grown - half) / side)))
+            y1 = np.int64(np.floor((y_max + grown) / side))
+            for y in range(y0, y1 + 1):
+                cy = y * side + half
+                low, high = z_min, z_max
+                if flat:
+                    plane = nx * (cx - a[0]) + ny * (cy - a[1]) - nz * a[2]
+                    low, high = clip_line(low, high, plane, nz, thick)
+                    low, high = clip_line(low, high, -plane, -nz, thick)
+                z0 = max(0, np.int64(np.floor((low - half) / side)))
+                z1 = np.int64(np.floor((high - half) / side)) + 1 if high >= low else -1
+                for z in range(z0, z1 + 1):
+                    cz = z * side + half
+                    if cz < low or cz > high:
+                        continue
+                    if shift == 7:
+                        if y < root.shape[1] and z < root.shape[2]:
+                            root[x, y, z] = 0
+                    else:
+                        px, py, pz = x >> 4, y >> 4, z >> 4
+                        if py < root.shape[1] and pz < root.shape[2] and root[px, py, pz] >= 0:
+                            pages[root[px, py, pz], x & 15, y & 15, z & 15] = 0
+
+
+@njit(cache=True, nogil=True)
+def list_bricks(root, pages, x, slot, coordinates):
+    """Number the marked bricks of column x in lexicographic order, from ``slot`` on.
+
+    Writes their local coordinates when ``coordinates`` is not empty; returns how many there are.
+    """
+    n = 0
+    for y in range(root.shape[1] * 16):
+        for z in range(root.shape[2] * 16):
+            if root[x >> 4, y >> 4, z >> 4] < 0:
+                continue
+            if find_brick(root, pages, x, y, z) >= 0:
+                if len(coordinates) > 0:
+                    pages[root[x >> 4, y >> 4, z >> 4], x & 15, y & 15, z & 15] = slot + n
+                    c = coordinates[slot + n]
+                    c[0], c[1], c[2] = x, y, z
+                n += 1
+    return n

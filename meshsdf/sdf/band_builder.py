@@ -1,0 +1,249 @@
+"""Build a narrow band slab by slab: mark bricks, scan distances, count crossings, keep what is near.
+
+A slab is a run of brick columns along x. Slabs share nothing but the page table, where each
+writes its own entries, so they run on all cores and need scratch memory for a few slabs only.
+"""
+
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from ..grid import BrickIndex, NarrowBand
+from ..kernels.band_distance import scan_edges, scan_faces, scan_vertices
+from ..kernels.brick_finish import closest_in_bricks, keep_active, renumber
+from ..kernels.brick_lookup import OUTSIDE
+from ..kernels.brick_marks import bin_by_x, extents_x, list_bricks, mark_cells
+from ..kernels.crossings import count_crossings, resolve_signs
+from ..kernels.parallel import even_ranges, n_threads, run_pieces
+from ..kernels.point_triangle import FRAME_SIZE, build_frames
+from ..progress import Progress
+from .lattice import Lattice
+from .memory import BYTES_PER_BRICK, BYTES_PER_BRICK_CLOSEST, SCRATCH_PER_BRICK, require_memory
+from .placed_mesh import PlacedMesh
+
+SLABS_PER_THREAD = 8  # enough to even out the work, few enough to keep rows long
+
+
+@dataclass
+class BandBuilder:
+    """The state of one conversion; `build` runs it.
+
+    ``sign`` is "parity", "winding" (integer crossings) or "unsigned".
+    """
+
+    placed: PlacedMesh
+    lattice: Lattice
+    half_width: float
+    sign: str
+    closest: bool
+    max_memory: float | None
+    progress: Progress
+    root: np.ndarray = field(init=False)
+    pages: np.ndarray = field(init=False)
+
+    def build(self) -> NarrowBand:
+        """Return the band; ``leaks`` then counts, per slab, lines whose crossings do not cancel."""
+        self._mark()
+        self._number_bricks()
+        self._allocate()
+        run_pieces(self._fill_slab, len(self.slabs), stage="distance", progress=self.progress)
+        return self._collect()
+
+    def _mark(self) -> None:
+        points, faces = self.placed.points, self.placed.faces
+        self.root = np.full(self.lattice.n_pages, OUTSIDE, np.int32)
+        all_faces = np.arange(len(faces), dtype=np.int32)
+        nothing = np.empty((0, 16, 16, 16), np.int32)
+        mark_cells(
+            points, faces, all_faces, self.half_width, 7, 0, len(self.root), self.root, nothing
+        )
+        used = self.root == 0
+        n_pages = int(np.count_nonzero(used))
+        require_memory(n_pages * 16384, self.max_memory, where="mesh_to_band(...): page table")
+        self.root[used] = np.arange(n_pages, dtype=np.int32)
+        self.pages = np.full((n_pages, 16, 16, 16), OUTSIDE, np.int32)
+        self._cut_slabs()
+        run_pieces(self._mark_slab, len(self.slabs), stage="bricks", progress=self.progress)
+
+    def _cut_slabs(self) -> None:
+        """Slabs of brick columns, and which faces, edges and vertices reach into each."""
+        points, faces, features = self.placed.points, self.placed.faces, self.placed.features
+        low = max(0, int((points[:, 0].min() - self.half_width) // 8))
+        high = int((points[:, 0].max() + self.half_width) // 8) + 1
+        ranges = even_ranges(high - low, SLABS_PER_THREAD * n_threads())
+        self.slabs = [(low + a, low + b) for a, b in ranges]
+        edges = np.array([8.0 * low] + [8.0 * b for _, b in self.slabs])
+        used = np.flatnonzero(np.diff(features.start)).astype(np.int32)
+        reach = self.half_width + 1.0
+        self.faces_of = _bin(points, faces, edges, reach)
+        self.edges_of = _bin(points, features.ends, edges, reach)
+        start, items = _bin(points, used[:, None], edges, reach)
+        self.vertices_of = start, used[items]
+
+    def _mark_slab(self, s: int) -> None:
+        first, last = self.slabs[s]
+        ids = _items(self.faces_of, s)
+        points, faces = self.placed.points, self.placed.faces
+        mark_cells(points, faces, ids, self.half_width, 3, first, last, self.root, self.pages)
+
+    def _number_bricks(self) -> None:
+        """Slots in lexicographic order; ``slot0[s]`` is the first of slab s."""
+        first, last = self.slabs[0][0], self.slabs[-1][1]
+        count = np.zeros(last - first, np.int64)
+        nothing = np.empty((0, 3), np.int64)
+
+        def count_column(x: int) -> None:
+            count[x] = list_bricks(self.root, self.pages, first + x, 0, nothing)
+
+        run_pieces(count_column, last - first)
+        slots = np.concatenate([[0], np.cumsum(count)])
+        self._require_memory(int(slots[-1]))
+        self.coordinates = np.empty((slots[-1], 3), np.int64)
+
+        def number_column(x: int) -> None:
+            if count[x]:
+                list_bricks(self.root, self.pages, first + x, slots[x], self.coordinates)
+
+        run_pieces(number_column, last - first)
+        self.slot0 = [int(slots[a - first]) for a, _ in self.slabs] + [int(slots[-1])]
+
+    def _require_memory(self, n_bricks: int) -> None:
+        per_brick = BYTES_PER_BRICK + (BYTES_PER_BRICK_CLOSEST if self.closest else 0)
+        scratch = n_bricks * SCRATCH_PER_BRICK * n_threads() / max(1, len(self.slabs))
+        where = f"mesh_to_band(...): {n_bricks} bricks"
+        require_memory(n_bricks * per_brick + scratch, self.max_memory, where=where)
+
+    def _allocate(self) -> None:
+        n = len(self.coordinates)
+        self.values = np.empty((n, 512), np.float32)
+        self.active = np.empty((n, 8), np.uint64)
+        self.kept = np.empty(n, np.int64)
+        self.n_kept = [0] * len(self.slabs)
+        self.leaks = [0] * len(self.slabs)
+        self.frames = np.empty((0, FRAME_SIZE))
+        if self.closest:
+            self.closest_face = np.empty((n, 512), np.int32)
+            self.barycentric = np.empty((n, 512, 2), np.float32)
+            corners = self.placed.points[self.placed.faces]
+            self.frames = np.empty((len(corners), FRAME_SIZE))
+            build_frames(corners, np.arange(len(corners)), 0, len(corners), self.frames)
+
+    def _fill_slab(self, s: int) -> None:
+        a, b = self.slot0[s], self.slot0[s + 1]
+        if a == b:
+            return
+        squared, nearest = self._distances(s)
+        inside = np.zeros((b - a, 8), np.uint64)
+        if self.sign != "unsigned":
+            self._signs(s, inside)
+        n = keep_active(
+            self.coordinates[a:b],
+            squared,
+            inside,
+            self.half_width,
+            self.lattice.voxel_size,
+            np.float32(self.half_width * self.lattice.voxel_size),
+            self.root,
+            self.pages,
+            self.values[a:b],
+            self.active[a:b],
+            self.kept[a:b],
+        )
+        self.n_kept[s] = n
+        self.coordinates[a : a + n] = self.coordinates[a:b][self.kept[a : a + n]]
+        if self.closest:
+            closest_in_bricks(
+                self.coordinates[a : a + n],
+                nearest[self.kept[a : a + n]],
+                self.active[a : a + n],
+                self.frames,
+                self.placed.face_ids,
+                self.closest_face[a : a + n],
+                self.barycentric[a : a + n],
+            )
+
+    def _distances(self, s: int) -> tuple[np.ndarray, np.ndarray]:
+        """Squared distances (b, 512) in voxels, and the nearest placed faces if asked for."""
+        a, b = self.slot0[s], self.slot0[s + 1]
+        squared = np.full((b - a, 512), self.half_width**2)
+        nearest = np.full((b - a if self.closest else 0, 512), len(self.placed.faces), np.int32)
+        first, last = self.slabs[s]
+        window = (self.half_width, 8 * first, 8 * last, self.root, self.pages, a, squared, nearest)
+        points, faces, f = self.placed.points, self.placed.faces, self.placed.features
+        scan_faces(points, faces, _items(self.faces_of, s), *window)
+        edges, vertices = _items(self.edges_of, s), _items(self.vertices_of, s)
+        scan_edges(points, faces, f.ends, f.first, f.order, edges, *window)
+        scan_vertices(points, f.ends, f.first, f.order, f.start, f.edges, vertices, *window)
+        return squared, nearest
+
+    def _signs(self, s: int, inside: np.ndarray) -> None:
+        a, b = self.slot0[s], self.slot0[s + 1]
+        first, last = self.slabs[s]
+        crossings = np.zeros((b - a, 512), np.int32)
+        parity = self.sign == "parity"
+        leaks = count_crossings(
+            self.placed.points,
+            self.placed.faces,
+            self.placed.edge_line,
+            self.placed.line_ends,
+            _items(self.faces_of, s),
+            8 * first,
+            8 * last,
+            self.root,
+            self.pages,
+            a,
+            not parity,
+            crossings,
+        )
+        leaks += resolve_signs(
+            self.coordinates[a:b], crossings, parity, self.root, self.pages, inside
+        )
+        self.leaks[s] = leaks
+
+    def _collect(self) -> NarrowBand:
+        """Close the gaps between slabs and number the bricks that are left."""
+        n = 0
+        arrays = [self.values, self.active, self.coordinates]
+        if self.closest:
+            arrays += [self.closest_face, self.barycentric]
+        for s, kept in enumerate(self.n_kept):
+            a = self.slot0[s]
+            if n != a and kept:
+                for array in arrays:
+                    array[n : n + kept] = array[a : a + kept]
+            n += kept
+        coordinates = self.coordinates[:n]
+        renumber(coordinates, 0, self.root, self.pages)
+        origin = self.lattice.page_origin
+        index = BrickIndex(coordinates + origin * 16, origin, self.root, self.pages)
+        shaped = partial(np.reshape, shape=(n, 8, 8, 8))
+        return NarrowBand(
+            index,
+            shaped(self.values[:n]),
+            self.active[:n],
+            self.lattice.voxel_size,
+            self.lattice.translation,
+            self.half_width,
+            self.sign,
+            shaped(self.closest_face[:n]) if self.closest else None,
+            self.barycentric[:n].reshape(n, 8, 8, 8, 2) if self.closest else None,
+        )
+
+
+def _bin(
+    points: np.ndarray, corners: np.ndarray, edges: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """CSR lists (start, items) of the features that reach into each slab."""
+    low, high = np.empty(len(corners)), np.empty(len(corners))
+    extents_x(points, corners, reach, low, high)
+    start = np.zeros(len(edges), np.int64)
+    bin_by_x(low, high, edges, start, np.empty(0, np.int32), len(corners))
+    items = np.empty(start[-1], np.int32)
+    bin_by_x(low, high, edges, start, items, len(corners))
+    return start, items
+
+
+def _items(lists: tuple[np.ndarray, np.ndarray], s: int) -> np.ndarray:
+    start, items = lists
+    return items[start[s] : start[s + 1]]
