@@ -13,6 +13,7 @@ from ..arrays import (
     BrickMasks,
     BrickValues,
     Ijk,
+    Ijk1,
     Points,
     Values,
     Vector3,
@@ -86,6 +87,32 @@ class NarrowBand:
         """Number of active nodes."""
         return int(np.bitwise_count(self.active).sum())
 
+    def active_box(self) -> tuple[Ijk1, Ijk1]:
+        """Return the lowest and highest index coordinates of active nodes.
+
+        Raises
+        ------
+        GridError
+            No node is active.
+        """
+        if self.n_active == 0:
+            raise GridError(
+                "no node is active", "NarrowBand.active_box()", "use a smaller voxel size"
+            )
+        rows = self.active.astype("<u8").view(np.uint8).reshape(-1, BRICK, BRICK)
+        flat = np.bitwise_or.reduce(rows, axis=(1, 2))
+        used = (
+            rows.any(axis=2),
+            rows.any(axis=1),
+            np.unpackbits(flat[:, None], axis=1, bitorder="little"),
+        )
+        low, high = np.empty(3, np.int64), np.empty(3, np.int64)
+        for axis in range(3):
+            brick, offset = np.nonzero(used[axis])
+            node = self.index.coordinates[brick, axis] * BRICK + offset
+            low[axis], high[axis] = node.min(), node.max()
+        return low, high
+
     def active_mask(self) -> np.ndarray:
         """Return the (b, 8, 8, 8) bool mask of active nodes."""
         bits = np.unpackbits(self.active.astype("<u8").view(np.uint8), bitorder="little")
@@ -103,6 +130,23 @@ class NarrowBand:
     def to_world(self, ijk: Ijk) -> Points:
         """Return the (n, 3) world positions of nodes."""
         return self.voxel_size * ijk + self.translation
+
+    def facts(self) -> dict:
+        """Return what scripts ask for: kind, voxel_size, shape, active_voxels, n_bricks, …"""
+        low, high = self.active_box()
+        return {
+            "kind": "narrow band",
+            "voxel_size": self.voxel_size,
+            "translation": self.translation.tolist(),
+            "first_node": low.tolist(),
+            "shape": (high - low + 1).tolist(),
+            "half_width": self.half_width,
+            "background": self.background,
+            "active_voxels": self.n_active,
+            "n_bricks": self.index.n_bricks,
+            "sign": self.sign,
+            "has_closest_faces": self.closest_face is not None,
+        }
 
     def value_at(self, ijk: Ijk) -> Values:
         """Return the (n,) values at nodes; +-background where there is no brick."""

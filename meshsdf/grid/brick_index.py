@@ -47,8 +47,13 @@ class BrickIndex:
     pages: PageTable
 
     @classmethod
-    def from_coordinates(cls, coordinates: BrickCoordinates) -> "BrickIndex":
-        """Index bricks given in lexicographic order; all others are OUTSIDE.
+    def from_coordinates(
+        cls, coordinates: BrickCoordinates, inside: BrickCoordinates | None = None
+    ) -> "BrickIndex":
+        """Index bricks given in lexicographic order.
+
+        Of the others, those listed in ``inside`` are INSIDE, with the whole page where none of
+        its bricks exists; the rest are OUTSIDE.
 
         Raises
         ------
@@ -71,6 +76,8 @@ class BrickIndex:
         pages = np.full((np.count_nonzero(named), PAGE, PAGE, PAGE), OUTSIDE, np.int32)
         entry = tuple((coordinates % PAGE).T)
         pages[(root[tuple(local.T)], *entry)] = np.arange(len(coordinates), dtype=np.int32)
+        if inside is not None:
+            _mark_inside(inside - page_origin * PAGE, root, pages)
         return cls(coordinates, page_origin, root, pages)
 
     @property
@@ -89,6 +96,16 @@ class BrickIndex:
         local = np.ascontiguousarray(bricks - self.origin)
         find_bricks(self.root, self.pages, local, found)
         return found
+
+
+def _mark_inside(local: np.ndarray, root: np.ndarray, pages: np.ndarray) -> None:
+    within = ((local >= 0) & (local < np.array(root.shape) * PAGE)).all(axis=1)
+    local = local[within]
+    page = tuple((local // PAGE).T)
+    missing = root[page] < 0
+    root[tuple((local[missing] // PAGE).T)] = INSIDE
+    local = local[~missing]
+    pages[(root[tuple((local // PAGE).T)], *(local % PAGE).T)] = INSIDE
 
 
 def _check_order(coordinates: np.ndarray) -> None:

@@ -45,3 +45,15 @@ class Grid:
     def is_signed(self) -> bool:
         """Whether values are negative inside."""
         return self.sign != "unsigned"
+
+    def facts(self) -> dict:
+        """Return what scripts ask for: kind, voxel_size, shape, active_voxels, …"""
+        return {
+            "kind": "dense grid",
+            "voxel_size": self.voxel_size,
+            "origin": self.origin.tolist(),
+            "shape": list(self.values.shape),
+            "active_voxels": int(np.isfinite(self.values).sum()),
+            "n_bricks": None,
+            "sign": self.sign,
+        }

@@ -190,7 +190,21 @@ def scan_edges(
 
 @njit(cache=True, nogil=True)
 def scan_vertices(
-    points, ends, first, order, start, edges, ids, reach, x0, x1, root, pages, slot0, squared, nearest
+    points,
+    ends,
+    first,
+    order,
+    start,
+    edges,
+    ids,
+    reach,
+    x0,
+    x1,
+    root,
+    pages,
+    slot0,
+    squared,
+    nearest,
 ):
     """Scan the cones of the vertices ``ids``; vertex v touches ``edges[start[v]:start[v + 1]]``."""
     away = np.empty((MAX_FACES, 3))

@@ -56,9 +56,7 @@ def renumber(coordinates, slot0, root, pages):
 
 
 @njit(cache=True, nogil=True)
-def closest_in_bricks(
-    coordinates, nearest, active, frames, face_ids, closest_face, barycentric
-):
+def closest_in_bricks(coordinates, nearest, active, frames, face_ids, closest_face, barycentric):
     """Fill the closest face and the barycentrics of every active node, -1 and 0 elsewhere.
 
     ``nearest`` (b, 512) indexes ``frames``, the placed faces as `point_triangle` keeps them;

@@ -1,1 +1,7 @@
-"""mesh -> distance: bands and dense grids."""
+"""mesh -> distance: narrow bands and dense grids, signed by a reasoned choice."""
+
+from .dense import mesh_to_grid
+from .narrow_band import mesh_to_band
+from .sign import SignChoice, choose_sign
+
+__all__ = ["SignChoice", "choose_sign", "mesh_to_band", "mesh_to_grid"]

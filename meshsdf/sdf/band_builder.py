@@ -47,6 +47,8 @@ class BandBuilder:
         self._mark()
         self._number_bricks()
         self._allocate()
+        if self.sign != "unsigned":
+            run_pieces(self._sign_slab, len(self.slabs), stage="sign", progress=self.progress)
         run_pieces(self._fill_slab, len(self.slabs), stage="distance", progress=self.progress)
         return self._collect()
 
@@ -116,6 +118,7 @@ class BandBuilder:
 
     def _allocate(self) -> None:
         n = len(self.coordinates)
+        self.inside = np.zeros((n, 8), np.uint64)
         self.values = np.empty((n, 512), np.float32)
         self.active = np.empty((n, 8), np.uint64)
         self.kept = np.empty(n, np.int64)
@@ -134,13 +137,10 @@ class BandBuilder:
         if a == b:
             return
         squared, nearest = self._distances(s)
-        inside = np.zeros((b - a, 8), np.uint64)
-        if self.sign != "unsigned":
-            self._signs(s, inside)
         n = keep_active(
             self.coordinates[a:b],
             squared,
-            inside,
+            self.inside[a:b],
             self.half_width,
             self.lattice.voxel_size,
             np.float32(self.half_width * self.lattice.voxel_size),
@@ -177,7 +177,7 @@ class BandBuilder:
         scan_vertices(points, f.ends, f.first, f.order, f.start, f.edges, vertices, *window)
         return squared, nearest
 
-    def _signs(self, s: int, inside: np.ndarray) -> None:
+    def _sign_slab(self, s: int) -> None:
         a, b = self.slot0[s], self.slot0[s + 1]
         first, last = self.slabs[s]
         crossings = np.zeros((b - a, 512), np.int32)
@@ -197,7 +197,7 @@ class BandBuilder:
             crossings,
         )
         leaks += resolve_signs(
-            self.coordinates[a:b], crossings, parity, self.root, self.pages, inside
+            self.coordinates[a:b], crossings, parity, self.root, self.pages, self.inside[a:b]
         )
         self.leaks[s] = leaks
 

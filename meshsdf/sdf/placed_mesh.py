@@ -13,23 +13,31 @@ from jaxtyping import Int32
 
 from ..arrays import FaceLabels, Faces, Points
 from ..errors import SdfError
-from ..kernels.half_edges import edges_of_vertices, group_edges, sort_half_edges
-from ..mesh import Mesh
-from ..mesh.edge_chain import residual_edge_lines
-from ..mesh.faces import degenerate_faces, net_faces, odd_faces
-from ..mesh.weld import weld
+from ..kernels.vertex_edges import edges_of_vertices
+from ..mesh import Mesh, degenerate_faces, net_faces, odd_faces, residual_edge_lines, weld
+from ..mesh.edge_table import edge_table
 from .lattice import Lattice
 
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Edges with their half-edges, and vertices with their edges; see `kernels.half_edges`."""
+    """Edges with their half-edges, and vertices with their edges.
 
-    order: Int32[np.ndarray, " h"]
+    Attributes
+    ----------
+    ends : (e, 2) int32
+        Vertices of each edge.
+    order, first : (h,), (e + 1,) int32
+        Edge e has the half-edges ``3 f + corner`` in ``order[first[e]:first[e + 1]]``.
+    edges, start : (2 e,), (u + 1,) int32
+        Vertex v touches the edges in ``edges[start[v]:start[v + 1]]``.
+    """
+
     ends: Int32[np.ndarray, "e 2"]
+    order: Int32[np.ndarray, " h"]
     first: Int32[np.ndarray, " f"]
-    start: Int32[np.ndarray, " s"]
     edges: Int32[np.ndarray, " t"]
+    start: Int32[np.ndarray, " s"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +70,13 @@ class PlacedMesh:
     @cached_property
     def features(self) -> Features:
         """Edges and vertices of the faces."""
-        n = 3 * len(self.faces)
-        order = np.empty(n, np.int32)
-        sort_half_edges(self.faces, len(self.points), order)
-        ends, first = np.empty((n, 2), np.int32), np.empty(n + 1, np.int32)
-        n_edges = group_edges(self.faces, order, ends, first)
-        ends, first = ends[:n_edges].copy(), first[: n_edges + 1].copy()
+        table = edge_table(self.faces, len(self.points))
+        first = np.zeros(len(table.edges) + 1, np.int32)
+        np.cumsum(table.n_uses, out=first[1:])
         start = np.empty(len(self.points) + 1, np.int32)
-        edges = np.empty(2 * n_edges, np.int32)
-        edges_of_vertices(ends, len(self.points), start, edges)
-        return Features(order, ends, first, start, edges)
+        edges = np.empty(2 * len(table.edges), np.int32)
+        edges_of_vertices(table.edges, len(self.points), start, edges)
+        return Features(table.edges, table.half_edges, first, edges, start)
 
 
 def weld_faces(mesh: Mesh) -> tuple[Points, Faces]:

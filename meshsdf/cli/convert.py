@@ -1,0 +1,112 @@
+"""``meshsdf convert``: mesh to volume."""
+
+import os
+
+import click
+
+from .console import YES, Console, file_size, plural
+from .options import (
+    PositiveNumber,
+    force_option,
+    half_width_option,
+    json_option,
+    max_memory_option,
+    path,
+    sign_option,
+)
+
+
+@click.command(epilog="Example: meshsdf convert bunny.obj bunny.npz --resolution 256")
+@click.argument("mesh", type=path)
+@click.argument("out", type=path)
+@click.option("--resolution", type=PositiveNumber(), help="Voxels along the longest side.")
+@click.option("--voxel-size", type=PositiveNumber(), help="Size of a voxel, world units.")
+@half_width_option
+@sign_option
+@click.option("--dense", is_flag=True, help="A full grid, exact at every node.")
+@click.option("--half", is_flag=True, help="Store 16-bit floats.")
+@click.option("--closest", is_flag=True, help="Also store closest faces and barycentrics.")
+@max_memory_option
+@force_option
+@json_option
+def command(
+    mesh: str,
+    out: str,
+    resolution: float | None,
+    voxel_size: float | None,
+    half_width: float,
+    sign: str,
+    dense: bool,
+    half: bool,
+    closest: bool,
+    max_memory: float | None,
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Turn MESH into a volume of exact signed distances, OUT.
+
+    Without --resolution or --voxel-size the longest side gets 128 voxels.
+    """
+    if resolution is not None and voxel_size is not None:
+        raise click.UsageError("give --resolution or --voxel-size, not both")
+    if dense and closest:
+        raise click.UsageError("--closest is for narrow bands; leave out --dense")
+    if voxel_size is None and resolution is None:
+        resolution = 128
+    console = Console("convert", as_json=as_json)
+    console.watch_compilation()
+    from ..io import check_output, read_mesh, write_volume
+    from ..mesh.two_set import check
+    from ..sdf import choose_sign, mesh_to_band, mesh_to_grid
+
+    check_output(out, kind="volume", force=force)
+    warnings: list[str] = []
+    with console.stage("load"):
+        loaded = read_mesh(mesh, warn=warnings.append)
+    with console.stage("check"):
+        report = check(loaded, self_intersections=False)
+        choice = choose_sign(report, sign)
+    options = {
+        "resolution": resolution,
+        "voxel_size": voxel_size,
+        "half_width": half_width,
+        "sign": sign,
+        "report": report,
+        "max_memory": max_memory,
+        "progress": console.progress,
+    }
+    if dense:
+        volume = mesh_to_grid(loaded, **options)
+    else:
+        volume = mesh_to_band(loaded, closest=closest, **options)
+    with console.stage("write"):
+        write_volume(out, volume, half=half, force=force)
+    console.close()
+
+    warnings = [*warnings, *choice.warnings]
+    for warning in warnings:
+        console.say(f"warning: {warning}")
+    facts = volume.facts()
+    seconds = console.timings("load", "check", "bricks", "distance", "far field", "sign", "write")
+    seconds["distance"] += seconds.pop("bricks") + seconds.pop("far field")
+    console.result(_words(mesh, out, facts, choice, loaded, seconds["total"]))
+    console.json(
+        {"input": mesh, "output": out, "bytes": os.path.getsize(out)}
+        | facts
+        | {"sign": choice.method, "sign_reason": choice.reason}
+        | {"seconds": seconds, "warnings": warnings}
+    )
+    return YES
+
+
+def _words(mesh: str, out: str, facts: dict, choice, loaded, total: float) -> str:
+    shape = " x ".join(str(n) for n in facts["shape"])
+    kind = "dense grid" if facts["n_bricks"] is None else f"{plural(facts['n_bricks'], 'brick')}"
+    return (
+        f"{mesh}: {plural(loaded.n_vertices, 'vertex', 'vertices')}, "
+        f"{plural(loaded.n_faces, 'face')}\n"
+        f"sign: {choice.method} ({choice.reason})\n"
+        f"{out}: {shape} nodes of {facts['voxel_size']:.6g}, {kind}, "
+        f"{plural(facts['active_voxels'], 'active voxel')}, "
+        f"{file_size(os.path.getsize(out))}, {total:.2f} s"
+    )

@@ -1,0 +1,85 @@
+"""Options that several commands share, and the types they parse to."""
+
+import math
+import re
+
+import click
+
+UNITS = {"": 1, "k": 1e3, "m": 1e6, "g": 1e9, "t": 1e12}
+
+
+class PositiveNumber(click.ParamType):
+    """A finite number above zero."""
+
+    name = "number"
+
+    def convert(self, value, param, ctx):
+        try:
+            number = float(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number", param, ctx)
+        if not (math.isfinite(number) and number > 0):
+            self.fail(f"{value} is not above 0", param, ctx)
+        return number
+
+
+class Resolutions(click.ParamType):
+    """Comma-separated numbers above zero."""
+
+    name = "n,n,..."
+
+    def convert(self, value, param, ctx):
+        if isinstance(value, tuple):
+            return value
+        return tuple(PositiveNumber().convert(part, param, ctx) for part in value.split(","))
+
+
+class Bytes(click.ParamType):
+    """A size such as 500M, 4G or 1.5e9."""
+
+    name = "size"
+
+    def convert(self, value, param, ctx):
+        if isinstance(value, float):
+            return value
+        found = re.fullmatch(r"([0-9.eE+]+)\s*([kmgtKMGT]?)[bB]?", value.strip())
+        if not found:
+            self.fail(f"{value!r} is not a size; write 500M, 4G or a number of bytes", param, ctx)
+        return PositiveNumber().convert(found[1], param, ctx) * UNITS[found[2].lower()]
+
+
+class Length(click.ParamType):
+    """A length in world units, or in voxels when it ends in ``vox``: (value, is_voxels)."""
+
+    name = "length"
+
+    def convert(self, value, param, ctx):
+        if isinstance(value, tuple):
+            return value
+        in_voxels = value.endswith("vox")
+        return PositiveNumber().convert(value.removesuffix("vox"), param, ctx), in_voxels
+
+
+path = click.Path(path_type=str)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+force_option = click.option("--force", is_flag=True, help="Overwrite files that exist.")
+max_memory_option = click.option(
+    "--max-memory",
+    type=Bytes(),
+    default=None,
+    help="Refuse work that needs more, e.g. 4G.  [default: 80% of what is free]",
+)
+sign_option = click.option(
+    "--sign",
+    type=click.Choice(["auto", "parity", "winding", "unsigned"]),
+    default="auto",
+    show_default=True,
+    help="How inside is told; auto asks check.",
+)
+half_width_option = click.option(
+    "--half-width",
+    type=PositiveNumber(),
+    default=3.0,
+    show_default=True,
+    help="Voxels on each side of the surface.",
+)

@@ -1,0 +1,151 @@
+"""Write a file beside its place and rename it there: a stop leaves the old file, or none.
+
+The bytes reach the disk (fsync) before the name does, so a power cut cannot leave half a file
+under the final name either.
+"""
+
+import errno
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from ..errors import IoError
+
+_FULL = {errno.ENOSPC, errno.EDQUOT}
+_NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EACCES}
+
+
+def check_output(path: str | os.PathLike, force: bool) -> None:
+    """Refuse a place that cannot be written, before any work starts.
+
+    Parameters
+    ----------
+    path : path
+        The file to be written.
+    force : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    IoError
+        The file exists and ``force`` is false, it is a folder or a device, its folder is missing
+        or does not allow new files.
+    """
+    target = _target(path)
+    where = f"output {path}"
+    folder = target.parent
+    if not folder.exists():
+        raise IoError(f"folder {folder} does not exist", where, "create the folder first")
+    if not folder.is_dir():
+        raise IoError(f"{folder} is a file, not a folder", where, "name another folder")
+    try:
+        mode = os.lstat(target).st_mode
+    except FileNotFoundError:
+        mode = None
+    except OSError as error:
+        raise IoError(f"cannot write: {error.strerror}", where, "choose another name") from error
+    if mode is not None:
+        if stat.S_ISDIR(mode):
+            raise IoError("the output is a folder", where, "give the name of a file in it")
+        if not stat.S_ISREG(mode):
+            raise IoError("the output is not a regular file", where, "give the name of a file")
+        if not force:
+            raise _exists(where)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise _not_writable(folder, where)
+
+
+@contextmanager
+def atomic_write(path: str | os.PathLike, force: bool = False) -> Iterator[Path]:
+    """Yield a new, empty temporary file beside ``path``; move it there when the block ends.
+
+    Parameters
+    ----------
+    path : path
+        The file to be written. A symbolic link is followed.
+    force : bool
+        Whether an existing file may be replaced.
+
+    Yields
+    ------
+    temporary : Path
+        Write this file, by name. It has the suffix of ``path``.
+
+    Raises
+    ------
+    IoError
+        As `check_output`, which runs first; or the disk is full. Whatever is raised inside the
+        block, KeyboardInterrupt too, removes the temporary file and leaves the old one intact.
+    """
+    check_output(path, force)
+    target = _target(path)
+    where = f"output {path}"
+    temporary = target.with_name(f".meshsdf-{secrets.token_hex(8)}{target.suffix}")
+    try:
+        # 0o666 lets the user's umask decide, as for any other new file.
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        yield temporary
+        _flush(temporary)
+        _place(temporary, target, force, where)
+    except OSError as error:
+        raise _explained(error, target.parent, where) from error
+    finally:
+        # Gone already when it was renamed.
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _target(path: str | os.PathLike) -> Path:
+    """The file behind a symbolic link, so that the link itself survives."""
+    return Path(os.path.realpath(path))
+
+
+def _flush(path: Path) -> None:
+    with open(path, "rb+") as file:
+        os.fsync(file.fileno())
+
+
+def _place(temporary: Path, target: Path, force: bool, where: str) -> None:
+    """Give the temporary file its final name; without ``force``, only if that is still free."""
+    if force:
+        if target.exists():
+            os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
+        os.replace(temporary, target)
+    else:
+        try:
+            # A link fails when the name was taken meanwhile; a rename would overwrite.
+            os.link(temporary, target)
+        except FileExistsError:
+            raise _exists(where) from None
+        except OSError as error:
+            if error.errno not in _NO_LINKS:
+                raise
+            check_output(target, force)
+            os.replace(temporary, target)
+    with suppress(OSError):  # some file systems cannot flush a folder
+        folder = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def _explained(error: OSError, folder: Path, where: str) -> IoError:
+    if error.errno in _FULL:
+        what = f"disk full: {folder} has no room left; the old file, if any, is intact"
+        return IoError(what, where, "free some space, or write to another disk")
+    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        return _not_writable(folder, where)
+    what = f"writing failed ({error.strerror or error}); the old file, if any, is intact"
+    return IoError(what, where, "try another folder or disk")
+
+
+def _exists(where: str) -> IoError:
+    return IoError("the output exists", where, "pass --force (force=True) to replace it")
+
+
+def _not_writable(folder: Path, where: str) -> IoError:
+    return IoError(f"folder {folder} is not writable", where, "choose a folder you may write to")

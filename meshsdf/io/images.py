@@ -1,0 +1,54 @@
+"""Texture images to arrays, as stored: 8 bits per channel, first row on top."""
+
+import io
+import struct
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from .warn import Warn
+
+_IMAGE_ERRORS = (OSError, ValueError, SyntaxError, TypeError, IndexError, KeyError, EOFError)
+_MORE_IMAGE_ERRORS = (AttributeError, OverflowError, MemoryError, struct.error, RuntimeError)
+_KEPT_MODES = {"L", "LA", "RGB", "RGBA"}
+
+
+def read_image(source: Path | bytes, warn: Warn) -> np.ndarray | None:
+    """Return the (h, w, c) uint8 image, c = 1 to 4; None, said through ``warn``, if unreadable."""
+    from PIL import Image
+
+    shown = repr(source.name) if isinstance(source, Path) else "stored in the file"
+    file = source if isinstance(source, Path) else io.BytesIO(source)
+    bombs = (Image.DecompressionBombWarning, Image.DecompressionBombError)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(file) as image:
+                pixels = np.asarray(image.convert(_mode(image)))
+    except bombs as error:
+        warn(f"image {shown} is left out, it is too large: {error}")
+        return None
+    except (*_IMAGE_ERRORS, *_MORE_IMAGE_ERRORS) as error:
+        warn(f"image {shown} cannot be read: {error}")
+        return None
+    return pixels.reshape(*pixels.shape[:2], -1)
+
+
+def encode_png(image: np.ndarray) -> bytes:
+    """Return the (h, w, 1 to 4) uint8 image as the bytes of a PNG file."""
+    from PIL import Image
+
+    pixels = image[:, :, 0] if image.shape[2] == 1 else image
+    out = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(pixels)).save(out, "PNG")
+    return out.getvalue()
+
+
+def _mode(image) -> str:
+    if image.mode in _KEPT_MODES:
+        return image.mode
+    if image.mode == "P":
+        return "RGBA" if "transparency" in image.info else "RGB"
+    return "L" if image.mode in ("1", "I", "I;16", "F") else "RGB"

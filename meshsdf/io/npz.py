@@ -1,0 +1,260 @@
+"""Volumes as ``.npz``: our own lossless container, which ``numpy.load`` opens too.
+
+An uncompressed zip of little-endian ``.npy`` arrays, no pickles; the same volume gives the same
+bytes. Keys of both kinds, with shape () unless said:
+
+- ``format``: text, ``meshsdf.narrow_band/1`` or ``meshsdf.grid/1``
+- ``voxel_size``: float64, world units
+- ``sign``: text, how inside was told
+
+Narrow band, b bricks of 8 x 8 x 8 nodes:
+
+- ``translation`` (3,) float64: world position of node (0, 0, 0)
+- ``half_width``: float64, voxels; beyond the band the distance is ``half_width * voxel_size``
+- ``coordinates`` (b, 3) int64: brick coordinates, rising by x, then y, then z
+- ``values`` (b, 8, 8, 8) float32, or float16 when written with ``half``
+- ``active`` (b, 8) uint64: bit ``8 j + k`` of word i tells whether node (i, j, k) is in the band
+- ``page_origin`` (3,) int64, ``root`` (px, py, pz) int32, ``pages`` (p, 16, 16, 16) int32: the
+  page table; an entry is a page or slot (>= 0), -1 outside, -2 inside
+- ``closest_face`` (b, 8, 8, 8) int32 and ``barycentric`` (b, 8, 8, 8, 2) float32: if known
+
+Grid:
+
+- ``values`` (ni, nj, nk) float32 or float64, or float16; NaN where there are no data
+- ``origin`` (3,) float64: world position of node (0, 0, 0)
+"""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import GridError, IoError
+from ..grid import BrickIndex, Grid, NarrowBand
+from .atomic import atomic_write, check_output
+from .npy_archive import ZIP_ERRORS, ArchiveReader, ArrayHeader, write_archive
+from .registry import checked_input
+from .volume_checks import check_volume
+
+BAND = "meshsdf.narrow_band/1"
+GRID = "meshsdf.grid/1"
+
+_B = "bricks"  # stands for one number in all the shapes it occurs in
+_FLOATS = ("<f2", "<f4")
+_BAND_KEYS = {
+    "format": ("text", ()),
+    "voxel_size": (("<f8",), ()),
+    "translation": (("<f8",), (3,)),
+    "half_width": (("<f8",), ()),
+    "sign": ("text", ()),
+    "coordinates": (("<i8",), (_B, 3)),
+    "page_origin": (("<i8",), (3,)),
+    "root": (("<i4",), (None, None, None)),
+    "pages": (("<i4",), (None, 16, 16, 16)),
+    "values": (_FLOATS, (_B, 8, 8, 8)),
+    "active": (("<u8",), (_B, 8)),
+    "closest_face": (("<i4",), (_B, 8, 8, 8)),
+    "barycentric": (("<f4",), (_B, 8, 8, 8, 2)),
+}
+_GRID_KEYS = {
+    "format": ("text", ()),
+    "voxel_size": (("<f8",), ()),
+    "origin": (("<f8",), (3,)),
+    "sign": ("text", ()),
+    "values": ((*_FLOATS, "<f8"), (None, None, None)),
+}
+_OPTIONAL = {"closest_face", "barycentric"}
+_SMALLEST_HALF = 2.0**-14  # below this a float16 loses bits
+
+
+def write_npz(
+    path: str | os.PathLike, volume: NarrowBand | Grid, *, half: bool = False, force: bool = False
+) -> None:
+    """Write a volume; every field reads back bit-equal, values too unless ``half``.
+
+    Parameters
+    ----------
+    path : path
+        The ``.npz`` file.
+    volume : NarrowBand or Grid
+        What is written.
+    half : bool
+        Round values to float16: half the size, a relative error of at most 2**-11. Read back
+        they are float32. A distance nearer to 0 than 3e-8 loses its sign.
+    force : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    IoError
+        The file exists, its folder cannot be written, the disk is full, a number in the volume
+        could not be read back, or the distances do not fit float16.
+    """
+    check_output(path, force)
+    where = f"output {path}"
+    try:
+        check_volume(volume)
+    except ValueError as error:
+        raise IoError(f"the volume cannot be written: {error}", where, "build it anew") from error
+    if half:
+        _check_half(volume, where)
+    arrays = _band_arrays(volume) if isinstance(volume, NarrowBand) else _grid_arrays(volume)
+    if half:
+        arrays["values"] = arrays["values"].astype(np.float16)
+    with atomic_write(path, force) as temporary:
+        write_archive(temporary, arrays)
+
+
+def read_npz(path: str | os.PathLike) -> NarrowBand | Grid:
+    """Read a volume that `write_npz` wrote; its kind is that of the file.
+
+    Raises
+    ------
+    IoError
+        There is no such file, or it is damaged, cut off, compressed, or no volume. Nothing
+        larger than the file itself is ever allocated.
+    """
+    path = checked_input(path)
+    try:
+        with ArchiveReader(path) as archive:
+            kind = _kind(archive)
+            _check_headers(archive.headers, kind)
+            arrays = {name: archive.read(name) for name in archive.headers}
+        volume = _band(arrays) if kind == BAND else _grid(arrays)
+        check_volume(volume)
+    except GridError as error:
+        raise _unreadable(path, error.what) from error
+    except MemoryError as error:
+        raise _unreadable(path, "it does not fit in memory") from error
+    except OSError as error:
+        raise _unreadable(path, error.strerror or str(error)) from error
+    except ZIP_ERRORS as error:
+        raise _unreadable(path, str(error) or type(error).__name__) from error
+    return volume
+
+
+def probe_npz(path: str | os.PathLike) -> dict:
+    """Return what the headers say: ``kind``, ``format``, ``dtype``, ``shape`` and more.
+
+    ``kind`` is "narrow_band" or "grid"; both have ``voxel_size`` and ``sign``. A band has
+    ``n_bricks``, ``half_width``, ``translation`` and ``has_closest_face``; a grid has ``origin``.
+    ``shape`` is that of the stored values. The values themselves are neither read nor checked.
+    """
+    path = checked_input(path)
+    try:
+        with ArchiveReader(path) as archive:
+            kind = _kind(archive)
+            _check_headers(archive.headers, kind)
+            small = ["voxel_size", "sign"]
+            small += ["half_width", "translation"] if kind == BAND else ["origin"]
+            facts = {name: archive.read(name).tolist() for name in small}
+            values = archive.headers["values"]
+    except OSError as error:
+        raise _unreadable(path, error.strerror or str(error)) from error
+    except ZIP_ERRORS as error:
+        raise _unreadable(path, str(error) or type(error).__name__) from error
+    facts |= {"format": kind, "dtype": values.dtype.name, "shape": list(values.shape)}
+    if kind == BAND:
+        has_face = "closest_face" in archive.headers
+        return {"kind": "narrow_band", "n_bricks": values.shape[0], **facts} | {
+            "has_closest_face": has_face
+        }
+    return {"kind": "grid", **facts}
+
+
+def _band_arrays(band: NarrowBand) -> dict[str, np.ndarray]:
+    index = band.index
+    arrays = {
+        "format": np.array(BAND),
+        "voxel_size": np.array(band.voxel_size, np.float64),
+        "translation": band.translation,
+        "half_width": np.array(band.half_width, np.float64),
+        "sign": np.array(band.sign),
+        "coordinates": index.coordinates,
+        "page_origin": index.page_origin,
+        "root": index.root,
+        "pages": index.pages,
+        "values": band.values,
+        "active": band.active,
+    }
+    for name in ("closest_face", "barycentric"):
+        if getattr(band, name) is not None:
+            arrays[name] = getattr(band, name)
+    return arrays
+
+
+def _grid_arrays(grid: Grid) -> dict[str, np.ndarray]:
+    return {
+        "format": np.array(GRID),
+        "voxel_size": np.array(grid.voxel_size, np.float64),
+        "origin": grid.origin,
+        "sign": np.array(grid.sign),
+        "values": grid.values,
+    }
+
+
+def _band(arrays: dict[str, np.ndarray]) -> NarrowBand:
+    tables = [arrays[name] for name in ("coordinates", "page_origin", "root", "pages")]
+    return NarrowBand(
+        BrickIndex(*tables),
+        arrays["values"].astype(np.float32, copy=False),
+        arrays["active"],
+        float(arrays["voxel_size"]),
+        arrays["translation"],
+        float(arrays["half_width"]),
+        str(arrays["sign"]),
+        arrays.get("closest_face"),
+        arrays.get("barycentric"),
+    )
+
+
+def _grid(arrays: dict[str, np.ndarray]) -> Grid:
+    values = arrays["values"]
+    if values.dtype == np.float16:
+        values = values.astype(np.float32)
+    return Grid(values, float(arrays["voxel_size"]), arrays["origin"], str(arrays["sign"]))
+
+
+def _kind(archive: ArchiveReader) -> str:
+    header = archive.headers.get("format")
+    if header is None or header.dtype.kind != "U" or header.shape != ():
+        raise ValueError("it has no 'format' key, so it is not a volume of meshsdf")
+    kind = str(archive.read("format"))
+    if kind not in (BAND, GRID):
+        raise ValueError(f"its format is {kind!r}; known are {BAND!r} and {GRID!r}")
+    return kind
+
+
+def _check_headers(headers: dict[str, ArrayHeader], kind: str) -> None:
+    keys = _BAND_KEYS if kind == BAND else _GRID_KEYS
+    missing = keys.keys() - headers.keys() - _OPTIONAL
+    unknown = headers.keys() - keys.keys()
+    if missing or unknown:
+        word, names = ("lacks", missing) if missing else ("holds the unknown", unknown)
+        raise ValueError(f"it {word} {', '.join(map(repr, sorted(names)))}")
+    n_bricks = headers["coordinates"].shape[:1] if kind == BAND else ()
+    for name, header in headers.items():
+        dtypes, shape = keys[name]
+        expected = tuple(n_bricks[0] if n_bricks and side == _B else side for side in shape)
+        fits = len(header.shape) == len(shape) and all(
+            want is None or want == side for want, side in zip(expected, header.shape, strict=True)
+        )
+        is_right = header.dtype.kind == "U" if dtypes == "text" else header.dtype.str in dtypes
+        if not fits or not is_right:
+            raise ValueError(f"{name!r} is {header.dtype.name} of shape {header.shape}")
+
+
+def _check_half(volume: NarrowBand | Grid, where: str) -> None:
+    finite = np.abs(volume.values[np.isfinite(volume.values)])
+    largest = float(finite.max(initial=0.0))
+    if largest > np.finfo(np.float16).max or 0 < largest < _SMALLEST_HALF:
+        what = f"values up to {largest:g} do not fit float16 (6.1e-05 to 65504)"
+        raise IoError(what, where, "write without half, or scale the mesh")
+
+
+def _unreadable(path: Path, reason: str) -> IoError:
+    return IoError(
+        f"{path.name} is not a readable volume: {' '.join(reason.split())[:300]}",
+        f"file {path}",
+        "write it again; if it was copied, copy it again",
+    )

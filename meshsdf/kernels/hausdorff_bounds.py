@@ -1,0 +1,154 @@
+"""How far a triangle may be from a mesh: upper bounds from distances at four of its points.
+
+A piece is a triangle T with the points 0, 1, 2 (corners) and 3 (centroid), each with its computed
+squared distance d² to the mesh and the slot of its closest face. Four bounds on max over p in T
+of d(p), cheapest first; each stands alone, and the least one is kept:
+
+1. Lipschitz: d grows at most as fast as p moves. The centroid cuts T into three triangles; every
+   point of one is within its covering radius of one of its corners.
+2. One face F: distance to one convex set is convex, so max over T = max over corners of d(v, F).
+   Tried for the closest faces of all four points.
+3. Two faces F, G with a common edge e: cut T by a line across two sides. Map the corners to their
+   feet on the nearer of F and G, and the two cuts to points of e. Both parts of T are mapped into
+   one convex face each, linearly on triangles, and |p - map(p)| is convex on each: the largest
+   displacement of a corner or a cut bounds d on T. The cuts are placed where side and e are
+   nearest.
+4. A fan: the faces of the corners share a vertex w of the mesh. Cut T into three from the point y
+   of T nearest to w, map y to w, and cut each part as in 3 where its two faces share an edge.
+
+Bounds 2 to 4 see that a flat piece over several coplanar faces has distance zero, which no
+sampling and no Lipschitz argument can.
+
+References: D. Zheng et al. 2022, doi:10.1111/cgf.14612 (bound 2); L. Sacht, A. Jacobson 2024,
+doi:10.1111/cgf.15129 (cascades); Y. Kang et al. 2018 (splitting between two faces).
+"""
+
+import numpy as np
+from numba import njit
+
+from .point_triangle import squared_distance
+
+TINY = 1e-300  # keeps a zero length out of a denominator; its numerator is zero too
+
+
+@njit(cache=True, nogil=True)
+def upper_bounds(
+    points, squares, slots, pieces, begin, end, enough, frames, corners, order, upper
+):
+    """``upper[n]`` >= max of d over the piece with points ``pieces[n]`` (4,), begin <= n < end.
+
+    Cheaper bounds alone decide where they fall to ``enough``.
+    """
+    faces = np.empty(4, np.int32)
+    near = np.empty((4, 3))  # squared distance of face c to corner i
+    for n in range(begin, end):
+        piece = pieces[n]
+        bound = lipschitz_bound(points, squares, piece)
+        if bound > enough:
+            n_faces = _candidate_faces(piece, slots, order, faces)
+            least = bound * bound
+            for c in range(n_faces):
+                frame = frames[faces[c]]
+                for i in range(3):
+                    p = points[piece[i]]
+                    near[c, i] = squared_distance(frame, p[0], p[1], p[2], np.inf)
+                least = min(least, max(near[c, 0], near[c, 1], near[c, 2]))
+            if least > enough * enough:
+                for c in range(n_faces):
+                    for e in range(c + 1, n_faces):
+                        f, g = corners[order[faces[c]]], corners[order[faces[e]]]
+                        least = min(least, _two_faces(points, piece, near[c], near[e], f, g, least))
+            bound = np.sqrt(least)
+        upper[n] = bound
+
+
+@njit(cache=True, nogil=True)
+def lipschitz_bound(points, squares, piece):
+    """Bound 1: the largest of d + covering radius over the triangles (v_i, v_j, centroid)."""
+    bound = 0.0
+    c = points[piece[3]]
+    for i in range(3):
+        v, w = points[piece[i]], points[piece[(i + 1) % 3]]
+        vc, wc, vw = _distance2(v, c), _distance2(w, c), _distance2(v, w)
+        if vc + wc <= vw:
+            # Obtuse at c: farthest is a point of vw, on the bisector of vc or of wc
+            radius = max(vc / max(vw + vc - wc, TINY), wc / max(vw + wc - vc, TINY))
+            radius = min(radius, 0.5) * np.sqrt(vw)
+        else:
+            radius = np.sqrt(max(vc, wc, vw) / 3.0)  # Jung's theorem
+        d = max(squares[piece[i]], squares[piece[(i + 1) % 3]], squares[piece[3]])
+        bound = max(bound, np.sqrt(d) + radius)
+    return bound
+
+
+@njit(cache=True, nogil=True)
+def _candidate_faces(piece, slots, order, faces):
+    """Different closest faces of the piece's points, at most four."""
+    n = 0
+    for i in range(4):
+        slot = slots[piece[i]]
+        known = False
+        for c in range(n):
+            known = known or faces[c] == slot
+        if not known:
+            faces[n] = slot
+            n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _two_faces(points, piece, near_f, near_g, f, g, least):
+    """Bound 3, squared, for the triangles f and g (3, 3); infinite where it does not apply."""
+    largest, n_f, side = 0.0, 0, 0
+    for i in range(3):
+        largest = max(largest, min(near_f[i], near_g[i]))
+        if near_f[i] <= near_g[i]:
+            n_f += 1
+            side += i
+    if largest >= least or n_f == 0 or n_f == 3:
+        return np.inf
+    alone = side if n_f == 1 else 3 - side
+    # The common edge, by position: soups count too
+    n_common, a, b = 0, 0, 0
+    for i in range(3):
+        for j in range(3):
+            if f[i, 0] == g[j, 0] and f[i, 1] == g[j, 1] and f[i, 2] == g[j, 2]:
+                n_common += 1
+                a, b = b, i
+                break
+    if n_common != 2:
+        return np.inf
+    v = points[piece[alone]]
+    for i in range(1, 3):
+        w = points[piece[(alone + i) % 3]]
+        largest = max(largest, _segments2(v, w, f[a], f[b]))
+    return largest
+
+
+@njit(cache=True, nogil=True)
+def _segments2(p, q, a, b):
+    """Squared distance between a point of pq and one of ab, near the least possible.
+
+    The points are found in closed form (Ericson 2005, section 5.1.9); rounding may misplace them
+    along the segments, which leaves a bound a bound.
+    """
+    ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    vx, vy, vz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    rx, ry, rz = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    uu = max(ux * ux + uy * uy + uz * uz, TINY)
+    vv = max(vx * vx + vy * vy + vz * vz, TINY)
+    uv = ux * vx + uy * vy + uz * vz
+    ur = ux * rx + uy * ry + uz * rz
+    vr = vx * rx + vy * ry + vz * rz
+    s = min(max((uv * vr - ur * vv) / max(uu * vv - uv * uv, TINY), 0.0), 1.0)
+    t = (uv * s + vr) / vv
+    if t < 0.0 or t > 1.0:
+        t = min(max(t, 0.0), 1.0)
+        s = min(max((uv * t - ur) / uu, 0.0), 1.0)
+    dx, dy, dz = rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz
+    return dx * dx + dy * dy + dz * dz
+
+
+@njit(cache=True, nogil=True)
+def _distance2(p, q):
+    return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
