@@ -1,1 +1,71 @@
-"""Polygon meshes to exact signed distance volumes and back, with the loss proved."""
+"""Polygon meshes to exact signed distance volumes and back, with the loss proved.
+
+The main job reads: `read_mesh`, `check`, `mesh_to_band`, `marching_cubes`, `compare`.
+
+Conventions
+-----------
+- Distances are negative inside and positive outside.
+- Faces are counter-clockwise seen from outside.
+- Lengths are in world units: the numbers of the mesh file. Colours are linear RGB inside the
+  program, sRGB only at a file's edge, by its format's own rule.
+- Node (i, j, k) of a volume lies at ``voxel_size * (i, j, k) + translation``. The translation is
+  zero unless asked for, so volumes of one voxel size line up. Arrays are indexed ``[i, j, k]``.
+- ``resolution=N`` makes the voxel size the longest side of the mesh's box / N; ``half_width`` is
+  in voxels, 3 unless asked for.
+- Points and what is computed on them are float64, stored volumes float32.
+- The same input gives the same bytes, with any number of threads.
+
+>>> import numpy as np
+>>> from meshsdf.mesh.primitives import box_mesh
+>>> band = mesh_to_band(box_mesh(size=(2.0, 2.0, 2.0)), voxel_size=0.25)
+>>> band.value_at(np.array([[0, 0, 5], [0, 0, 4], [0, 0, 3]]))
+array([ 0.25,  0.  , -0.25])
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .errors import MeshsdfError
+    from .grid import Grid, NarrowBand
+    from .io import read_mesh, read_volume, write_mesh, write_volume
+    from .mesh import Mesh, TwoSetReport, check
+    from .report import Comparison, Enclosure, RoundTrip, compare, roundtrip
+    from .sdf import mesh_to_band, mesh_to_grid
+    from .surface import marching_cubes
+
+_HOME = {
+    "Comparison": "report",
+    "Enclosure": "report",
+    "Grid": "grid",
+    "Mesh": "mesh",
+    "MeshsdfError": "errors",
+    "NarrowBand": "grid",
+    "RoundTrip": "report",
+    "TwoSetReport": "mesh",
+    "check": "mesh",
+    "compare": "report",
+    "marching_cubes": "surface",
+    "mesh_to_band": "sdf",
+    "mesh_to_grid": "sdf",
+    "read_mesh": "io",
+    "read_volume": "io",
+    "roundtrip": "report",
+    "write_mesh": "io",
+    "write_volume": "io",
+}
+
+__all__ = list(_HOME)
+
+
+def __getattr__(name: str):
+    # Imported on first use, so that `import meshsdf` and the command line start at once
+    if name not in _HOME:
+        raise AttributeError(f"module 'meshsdf' has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOME[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -6,6 +6,9 @@
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt64
 
+Number = float | int | np.floating | np.integer
+"""A scalar that a caller may give as any kind of number."""
+
 Points = Float64[np.ndarray, "n 3"]
 Values = Float64[np.ndarray, " n"]
 Vector3 = Float64[np.ndarray, "3"]

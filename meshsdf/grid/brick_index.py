@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import BrickCoordinates, Ijk1, Indices, PageTable, RootTable
+from ..arrays import BrickCoordinates, Ijk, Ijk1, Indices, PageTable, RootTable
 from ..errors import GridError
 from ..kernels.brick_lookup import INSIDE, OUTSIDE, find_bricks
 
@@ -48,7 +48,7 @@ class BrickIndex:
 
     @classmethod
     def from_coordinates(
-        cls, coordinates: BrickCoordinates, inside: BrickCoordinates | None = None
+        cls, coordinates: BrickCoordinates, inside: Ijk | None = None
     ) -> "BrickIndex":
         """Index bricks given in lexicographic order.
 
@@ -90,7 +90,7 @@ class BrickIndex:
         """(3,) brick coordinate of the first brick of the root table."""
         return self.page_origin * PAGE
 
-    def lookup(self, bricks: BrickCoordinates) -> Indices:
+    def lookup(self, bricks: Ijk) -> Indices:
         """Return the slot or code of each of the (n, 3) bricks."""
         found = np.empty(len(bricks), np.int32)
         local = np.ascontiguousarray(bricks - self.origin)

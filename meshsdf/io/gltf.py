@@ -23,8 +23,9 @@ _MAX_VERTICES = np.iinfo(np.int32).max
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """One primitive where a node puts it."""
+    """One primitive where a node puts it; parts with one ``source`` share their vertices."""
 
+    source: tuple
     positions: np.ndarray
     faces: np.ndarray
     uv: np.ndarray | None
@@ -39,12 +40,12 @@ def read_gltf(path: Path, warn: Warn) -> Mesh:
         if not str(name).startswith(_READ_AS_PLAIN):
             raise ValueError(f"it needs the extension {name}, which is not read")
     parts, n_vertices, n_other = [], 0, 0
-    for mesh_index, matrix in _placed_meshes(document, warn):
+    for place, (mesh_index, matrix) in enumerate(_placed_meshes(document, warn)):
         for primitive in document.item("meshes", mesh_index)["primitives"]:
             if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
                 n_other += 1
                 continue
-            parts.append(_part(document, primitive, matrix, warn))
+            parts.append(_part(document, primitive, place, matrix, warn))
             n_vertices += len(parts[-1].positions)
             if n_vertices > _MAX_VERTICES:
                 raise ValueError("it holds more vertices than 32-bit indices can name")
@@ -85,7 +86,7 @@ def _placed_meshes(document: Document, warn: Warn):
     return placed
 
 
-def _roots(document: Document) -> list[int]:
+def _roots(document: Document) -> list:
     if document.items("scenes"):
         return document.item("scenes", document.json.get("scene", 0)).get("nodes", [])
     nodes = document.items("nodes")
@@ -113,7 +114,7 @@ def _matrix(node: dict) -> np.ndarray:
     return matrix
 
 
-def _part(document: Document, primitive: dict, matrix: np.ndarray, warn: Warn) -> _Part:
+def _part(document: Document, primitive: dict, place: int, matrix: np.ndarray, warn: Warn) -> _Part:
     attributes = primitive["attributes"]
     if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
         raise ValueError("its meshes are compressed with Draco, which is not read")
@@ -133,7 +134,8 @@ def _part(document: Document, primitive: dict, matrix: np.ndarray, warn: Warn) -
         positions = positions @ matrix[:3, :3].T + matrix[:3, 3]
         if np.linalg.det(matrix[:3, :3]) < 0:
             faces = faces[:, ::-1]
-    return _Part(positions, faces, uv, colors, material)
+    source = (place, *(attributes.get(name) for name in ("POSITION", uv_name, "COLOR_0")))
+    return _Part(source, positions, faces, uv, colors, material)
 
 
 def _triangles(order: np.ndarray, mode: int) -> np.ndarray:
@@ -164,15 +166,18 @@ def _attribute(document: Document, attributes: dict, name: str, count: int) -> n
 
 
 def _joined(parts: list[_Part], document: Document, warn: Warn) -> Mesh:
-    shift = np.cumsum([0] + [len(part.positions) for part in parts])
-    faces = [part.faces + np.int32(first) for part, first in zip(parts, shift, strict=False)]
+    """One mesh of all parts; those that draw on the same arrays keep their common vertices."""
+    sources = {part.source: part for part in parts}
+    n_before = np.cumsum([0] + [len(part.positions) for part in sources.values()])
+    first = dict(zip(sources, n_before.tolist(), strict=False))
+    faces = [part.faces + np.int32(first[part.source]) for part in parts]
     uv = colors = material_index = None
     if any(part.uv is not None for part in parts):
-        uv = np.zeros((shift[-1], 2))
+        uv = np.zeros((n_before[-1], 2))
     if any(part.colors is not None for part in parts):
-        colors = np.ones((shift[-1], 4), np.float32)  # no colour means white
-    for part, first in zip(parts, shift, strict=False):
-        rows = slice(first, first + len(part.positions))
+        colors = np.ones((n_before[-1], 4), np.float32)  # no colour means white
+    for source, part in sources.items():
+        rows = slice(first[source], first[source] + len(part.positions))
         if part.uv is not None:
             uv[rows, 0] = part.uv[:, 0]
             uv[rows, 1] = 1 - part.uv[:, 1].astype(np.float64)  # glTF counts from the top
@@ -182,7 +187,7 @@ def _joined(parts: list[_Part], document: Document, warn: Warn) -> Mesh:
         counts = [len(part.faces) for part in parts]
         material_index = np.repeat(np.array([p.material for p in parts], np.int32), counts)
     return Mesh(
-        np.concatenate([part.positions for part in parts]),
+        np.concatenate([part.positions for part in sources.values()]),
         np.concatenate(faces),
         uv=uv,
         vertex_colors=colors,

@@ -11,6 +11,8 @@ import zlib
 from json import JSONDecodeError
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import IoError, MeshError
 from ..mesh import Mesh
 from .atomic import atomic_write, check_output
@@ -64,7 +66,9 @@ def read_mesh(path: str | os.PathLike, *, warn: Warn = ignore) -> Mesh:
     format = format_of(path, "mesh", "reader")
     path = checked_input(path)
     try:
-        return format.function(format.reader)(path, warn)
+        # Absurd numbers are judged once, when the mesh is made; on the way they may overflow.
+        with np.errstate(all="ignore"):
+            return format.function(format.reader)(path, warn)
     except MeshError as error:
         raise _unreadable(path, format, error.what) from error
     except PARSER_ERRORS as error:

@@ -64,6 +64,7 @@ _GRID_KEYS = {
     "values": ((*_FLOATS, "<f8"), (None, None, None)),
 }
 _OPTIONAL = {"closest_face", "barycentric"}
+_LARGEST_HALF = 65504.0
 _SMALLEST_HALF = 2.0**-14  # below this a float16 loses bits
 
 
@@ -247,8 +248,8 @@ def _check_headers(headers: dict[str, ArrayHeader], kind: str) -> None:
 def _check_half(volume: NarrowBand | Grid, where: str) -> None:
     finite = np.abs(volume.values[np.isfinite(volume.values)])
     largest = float(finite.max(initial=0.0))
-    if largest > np.finfo(np.float16).max or 0 < largest < _SMALLEST_HALF:
-        what = f"values up to {largest:g} do not fit float16 (6.1e-05 to 65504)"
+    if largest > _LARGEST_HALF or 0 < largest < _SMALLEST_HALF:
+        what = f"values up to {largest:g} do not fit float16 ({_SMALLEST_HALF:.2g} to {_LARGEST_HALF:g})"
         raise IoError(what, where, "write without half, or scale the mesh")
 
 

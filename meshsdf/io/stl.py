@@ -15,6 +15,7 @@ from .text_rows import rows
 from .warn import Warn
 
 _HEADER = 84
+_LARGEST = float(np.finfo(np.float32).max)
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _CORNER = re.compile(rb"^\s*vertex\b([^\n]*)", re.MULTILINE | re.IGNORECASE)
 _FACET = re.compile(rb"^\s*facet\b", re.MULTILINE | re.IGNORECASE)
@@ -55,7 +56,7 @@ def write_stl(path: Path, mesh: Mesh) -> None:
 def float32_positions(positions: np.ndarray) -> np.ndarray:
     """Return the positions as float32; IoError if one is too large for it."""
     largest = float(np.abs(positions).max(initial=0.0))
-    if largest > np.finfo(np.float32).max:
+    if largest > _LARGEST:
         raise IoError(
             f"a coordinate of {largest:g} does not fit the float32 of this format",
             "write_mesh(mesh=...)",

@@ -39,7 +39,9 @@ def check_volume(volume: NarrowBand | Grid) -> None:
 def check_index(index: BrickIndex) -> None:
     """ValueError unless every brick has one slot and every slot one brick."""
     coordinates, root, pages = index.coordinates, index.root, index.pages
-    if np.abs(np.concatenate([coordinates.ravel(), index.page_origin])).max() > LARGEST_BRICK:
+    # Compared on both sides, because the absolute value of the smallest int64 is negative.
+    numbers = np.concatenate([coordinates.ravel(), index.page_origin])
+    if numbers.min() < -LARGEST_BRICK or numbers.max() > LARGEST_BRICK:
         raise ValueError("a brick coordinate is too large")
     step = np.diff(coordinates, axis=0)
     first = np.where(step[:, 0] != 0, step[:, 0], np.where(step[:, 1] != 0, step[:, 1], step[:, 2]))

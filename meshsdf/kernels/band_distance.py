@@ -23,7 +23,7 @@ from numba import njit
 
 from .brick_lookup import find_brick
 from .clip import clip_line, clip_segment, triangle_range
-from .point_triangle import FRAME_SIZE, build_frames, squared_distance
+from .point_triangle import closest_on_triangle
 
 SLIVER = 1e-5  # altitude / longest edge
 FACE_SLACK = 1e-8  # voxels; covers prisms that part by less than a flat edge's wedge
@@ -35,17 +35,12 @@ MAX_FACES = 16  # half-spaces used per edge; leaving some out only widens the re
 @njit(cache=True, nogil=True)
 def scan_faces(points, faces, ids, reach, x0, x1, root, pages, slot0, squared, nearest):
     """Scan the prisms of the faces ``ids`` over the nodes with x in [x0, x1)."""
-    frames = np.empty((1, FRAME_SIZE))
-    corners = np.empty((1, 3, 3))
-    only = np.zeros(1, np.int64)
     for n in range(len(ids)):
         f = ids[n]
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
         nx, ny, nz, area, longest = _normal(a, b, c)
         if area <= SLIVER * longest * longest:
-            corners[0, 0], corners[0, 1], corners[0, 2] = a, b, c
-            build_frames(corners, only, 0, 1, frames)
-            _scan_sliver(a, b, c, frames[0], f, reach, x0, x1, root, pages, slot0, squared, nearest)
+            _scan_sliver(a, b, c, f, reach, x0, x1, root, pages, slot0, squared, nearest)
             continue
         # Planes through the edges, normals in the face and pointing out of it
         px, py, pz = _edge_plane(a, b, nx, ny, nz)
@@ -254,7 +249,7 @@ def scan_vertices(
 
 
 @njit(cache=True, nogil=True)
-def _scan_sliver(a, b, c, frame, f, reach, x0, x1, root, pages, slot0, squared, nearest):
+def _scan_sliver(a, b, c, f, reach, x0, x1, root, pages, slot0, squared, nearest):
     """Measure a sliver by its closest point, in the capsule around its longest edge."""
     ab = (b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2
     bc = (c[0] - b[0]) ** 2 + (c[1] - b[1]) ** 2 + (c[2] - b[2]) ** 2
@@ -286,7 +281,7 @@ def _scan_sliver(a, b, c, frame, f, reach, x0, x1, root, pages, slot0, squared, 
                 slot = find_brick(root, pages, x >> 3, y >> 3, z >> 3)
                 if slot >= 0:
                     node = ((x & 7) << 6) | ((y & 7) << 3) | (z & 7)
-                    distance = squared_distance(frame, float(x), float(y), float(z), np.inf)
+                    distance = closest_on_triangle(float(x), float(y), float(z), a, b, c)[0]
                     _keep(squared, nearest, slot - slot0, node, distance, f)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from .brick_lookup import INSIDE, OUTSIDE
-from .point_triangle import barycentric_foot
+from .point_triangle import closest_on_triangle
 
 
 @njit(cache=True, nogil=True)
@@ -56,13 +56,13 @@ def renumber(coordinates, slot0, root, pages):
 
 
 @njit(cache=True, nogil=True)
-def closest_in_bricks(coordinates, nearest, active, frames, face_ids, closest_face, barycentric):
+def closest_in_bricks(
+    coordinates, nearest, active, points, faces, face_ids, closest_face, barycentric
+):
     """Fill the closest face and the barycentrics of every active node, -1 and 0 elsewhere.
 
-    ``nearest`` (b, 512) indexes ``frames``, the placed faces as `point_triangle` keeps them;
-    ``face_ids`` turns that into the mesh's own numbers.
+    ``nearest`` (b, 512) indexes ``faces``; ``face_ids`` turns that into the mesh's own numbers.
     """
-    weights = np.empty(3)
     for b in range(len(coordinates)):
         for node in range(512):
             i, j, k = node >> 6, (node >> 3) & 7, node & 7
@@ -74,7 +74,10 @@ def closest_in_bricks(coordinates, nearest, active, frames, face_ids, closest_fa
             x = float(8 * coordinates[b, 0] + i)
             y = float(8 * coordinates[b, 1] + j)
             z = float(8 * coordinates[b, 2] + k)
-            barycentric_foot(frames[f], x, y, z, weights)
+            corner0, corner1, corner2 = faces[f, 0], faces[f, 1], faces[f, 2]
+            _, _, second, third = closest_on_triangle(
+                x, y, z, points[corner0], points[corner1], points[corner2]
+            )
             closest_face[b, node] = face_ids[f]
-            barycentric[b, node, 0] = weights[1]
-            barycentric[b, node, 1] = weights[2]
+            barycentric[b, node, 0] = second
+            barycentric[b, node, 1] = third

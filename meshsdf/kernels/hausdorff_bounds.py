@@ -13,8 +13,9 @@ of d(p), cheapest first; each stands alone, and the least one is kept:
    one convex face each, linearly on triangles, and |p - map(p)| is convex on each: the largest
    displacement of a corner or a cut bounds d on T. The cuts are placed where side and e are
    nearest.
-4. A fan: the faces of the corners share a vertex w of the mesh. Cut T into three from the point y
-   of T nearest to w, map y to w, and cut each part as in 3 where its two faces share an edge.
+4. A fan: the closest faces of the corners share a vertex w of the mesh. Cut T into three from the
+   point y of T nearest to w, and map y to w. Each part has a side of T between two faces of the
+   fan: cut it at every edge passed on the way around w, and map the cuts to those edges as in 3.
 
 Bounds 2 to 4 see that a flat piece over several coplanar faces has distance zero, which no
 sampling and no Lipschitz argument can.
@@ -26,38 +27,43 @@ doi:10.1111/cgf.15129 (cascades); Y. Kang et al. 2018 (splitting between two fac
 import numpy as np
 from numba import njit
 
-from .point_triangle import squared_distance
+from .point_triangle import closest_on_triangle, squared_distance
 
 TINY = 1e-300  # keeps a zero length out of a denominator; its numerator is zero too
+MAX_FAN = 16  # faces passed around a vertex, each way; more are left to cutting
 
 
 @njit(cache=True, nogil=True)
 def upper_bounds(
-    points, squares, slots, pieces, begin, end, enough, frames, corners, order, upper
+    points, squares, slots, pieces, begin, end, enough, frames, corners, order, around, upper
 ):
     """``upper[n]`` >= max of d over the piece with points ``pieces[n]`` (4,), begin <= n < end.
 
-    Cheaper bounds alone decide where they fall to ``enough``.
+    Cheaper bounds alone decide where they fall to ``enough``. ``around`` (m, 6) holds for every
+    face its vertices and its neighbours over the edges after them, or is empty: no bound 4.
     """
-    faces = np.empty(4, np.int32)
-    near = np.empty((4, 3))  # squared distance of face c to corner i
+    candidates = np.empty(4, np.int32)
+    near = np.empty((4, 3))  # squared distance of each candidate face to each corner
     for n in range(begin, end):
         piece = pieces[n]
         bound = lipschitz_bound(points, squares, piece)
         if bound > enough:
-            n_faces = _candidate_faces(piece, slots, order, faces)
+            n_candidates = _candidates(piece, slots, candidates)
             least = bound * bound
-            for c in range(n_faces):
-                frame = frames[faces[c]]
+            for c in range(n_candidates):
+                frame = frames[candidates[c]]
                 for i in range(3):
-                    p = points[piece[i]]
-                    near[c, i] = squared_distance(frame, p[0], p[1], p[2], np.inf)
+                    v = points[piece[i]]
+                    near[c, i] = squared_distance(frame, v[0], v[1], v[2], np.inf)
                 least = min(least, max(near[c, 0], near[c, 1], near[c, 2]))
             if least > enough * enough:
-                for c in range(n_faces):
-                    for e in range(c + 1, n_faces):
-                        f, g = corners[order[faces[c]]], corners[order[faces[e]]]
-                        least = min(least, _two_faces(points, piece, near[c], near[e], f, g, least))
+                for c in range(n_candidates):
+                    for e in range(c + 1, n_candidates):
+                        f, g = corners[order[candidates[c]]], corners[order[candidates[e]]]
+                        found = _two_faces(points, piece, near[c], near[e], f, g, least)
+                        least = min(least, found)
+            if least > enough * enough and len(around) > 0:
+                least = _fan(points, squares, slots, piece, corners, order, around, least)
             bound = np.sqrt(least)
         upper[n] = bound
 
@@ -82,8 +88,8 @@ def lipschitz_bound(points, squares, piece):
 
 
 @njit(cache=True, nogil=True)
-def _candidate_faces(piece, slots, order, faces):
-    """Different closest faces of the piece's points, at most four."""
+def _candidates(piece, slots, faces):
+    """Slots of the different closest faces of the piece's points, at most four; their number."""
     n = 0
     for i in range(4):
         slot = slots[piece[i]]
@@ -121,16 +127,78 @@ def _two_faces(points, piece, near_f, near_g, f, g, least):
     v = points[piece[alone]]
     for i in range(1, 3):
         w = points[piece[(alone + i) % 3]]
-        largest = max(largest, _segments2(v, w, f[a], f[b]))
+        largest = max(largest, _segments2(v, w, f[a], f[b], 0.0)[0])
     return largest
 
 
 @njit(cache=True, nogil=True)
-def _segments2(p, q, a, b):
-    """Squared distance between a point of pq and one of ab, near the least possible.
+def _fan(points, squares, slots, piece, corners, order, around, least):
+    """Bound 4, squared, or ``least`` if that is less or no vertex is common to the faces."""
+    f = order[slots[piece[0]]]
+    for k in range(3):
+        w = around[f, k]
+        if _place(around, order[slots[piece[1]]], w) < 0:
+            continue
+        if _place(around, order[slots[piece[2]]], w) < 0:
+            continue
+        p, a, b, c = corners[f, k], points[piece[0]], points[piece[1]], points[piece[2]]
+        largest = closest_on_triangle(p[0], p[1], p[2], a, b, c)[0]
+        for i in range(3):
+            largest = max(largest, squares[piece[i]])
+        for i in range(3):
+            j = (i + 1) % 3
+            first, last = order[slots[piece[i]]], order[slots[piece[j]]]
+            if first != last and largest < least:
+                one = _walk(points[piece[i]], points[piece[j]], first, last, w, 1, corners, around)
+                two = _walk(points[piece[i]], points[piece[j]], first, last, w, 2, corners, around)
+                largest = max(largest, min(one, two))
+        least = min(least, largest)
+    return least
 
-    The points are found in closed form (Ericson 2005, section 5.1.9); rounding may misplace them
-    along the segments, which leaves a bound a bound.
+
+@njit(cache=True, nogil=True)
+def _walk(p, q, first, last, w, turn, corners, around):
+    """Cut pq at every edge between the faces first .. last around w; largest squared distance.
+
+    The walk leaves the first face over the edge from w to the corner ``turn`` after it. Infinite
+    if it meets a border, or does not arrive within ``MAX_FAN`` faces.
+    """
+    largest, share, face, came_from = 0.0, 0.0, first, np.int32(-1)
+    for _ in range(MAX_FAN):
+        k = _place(around, face, w)
+        if k < 0:
+            return np.inf
+        other = (k + turn) % 3
+        if around[face, other] == came_from:
+            other = 3 - k - other
+        came_from = around[face, other]
+        square, share = _segments2(p, q, corners[face, k], corners[face, other], share)
+        largest = max(largest, square)
+        # The edge from k to the next corner is number k, from k to the one before number other
+        face = around[face, 3 + (k if other == (k + 1) % 3 else other)]
+        if face == last:
+            return largest
+        if face < 0:
+            return np.inf
+    return np.inf
+
+
+@njit(cache=True, nogil=True)
+def _place(around, face, vertex):
+    """Which corner of the face the vertex is, or -1."""
+    for k in range(3):
+        if around[face, k] == vertex:
+            return k
+    return -1
+
+
+@njit(cache=True, nogil=True)
+def _segments2(p, q, a, b, first_share):
+    """Squared distance from a point of pq to one of ab, near the least possible, and its place.
+
+    The point of pq is ``p + share * (q - p)`` with share >= first_share. Both are found in closed
+    form (Ericson 2005, section 5.1.9); rounding may misplace them along the segments, which
+    leaves a bound a bound.
     """
     ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     vx, vy, vz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -140,13 +208,13 @@ def _segments2(p, q, a, b):
     uv = ux * vx + uy * vy + uz * vz
     ur = ux * rx + uy * ry + uz * rz
     vr = vx * rx + vy * ry + vz * rz
-    s = min(max((uv * vr - ur * vv) / max(uu * vv - uv * uv, TINY), 0.0), 1.0)
+    s = min(max((uv * vr - ur * vv) / max(uu * vv - uv * uv, TINY), first_share), 1.0)
     t = (uv * s + vr) / vv
     if t < 0.0 or t > 1.0:
         t = min(max(t, 0.0), 1.0)
-        s = min(max((uv * t - ur) / uu, 0.0), 1.0)
+        s = min(max((uv * t - ur) / uu, first_share), 1.0)
     dx, dy, dz = rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz
-    return dx * dx + dy * dy + dz * dz
+    return dx * dx + dy * dy + dz * dz, s
 
 
 @njit(cache=True, nogil=True)

@@ -53,4 +53,6 @@ def edge_table(faces: Faces, n_vertices: int) -> EdgeTable:
     edges = np.empty((len(order), 2), dtype=np.int32)
     n_uses, net_uses = np.empty((2, len(order)), dtype=np.int32)
     k = number_edges(faces, order, edge_of_corner, edges, n_uses, net_uses)
-    return EdgeTable(edges[:k].copy(), n_uses[:k].copy(), net_uses[:k].copy(), edge_of_corner, order)
+    return EdgeTable(
+        edges[:k].copy(), n_uses[:k].copy(), net_uses[:k].copy(), edge_of_corner, order
+    )

@@ -23,6 +23,7 @@ from ..errors import MeshError
 from ..kernels.edges import mark_branching_vertices
 from ..progress import Progress, silent
 from .components import describe_components
+from .crack_repair import close_cracks
 from .edge_chain import residual_lines
 from .edge_table import EdgeTable, edge_table
 from .faces import degenerate_faces, face_sheets
@@ -73,6 +74,7 @@ def check(
     holes = trace_holes(points, segments)
     n_odd = int((table.n_uses % 2).sum())
     n_open = 0 if lines is None else lines.n_open_edges()
+    repair = close_cracks(points, faces, segments) if len(segments) else None
     progress("edges", 1.0)
     facts = {
         "two_set": len(segments) == 0,
@@ -98,6 +100,7 @@ def check(
         n_tjunction_edges=n_odd - n_open,
         holes=holes,
         certain_beyond=max((hole.reach for hole in holes), default=0.0),
+        crack_width=None if repair is None else repair.width,
         components=components,
         self_intersections=crossings,
         recommended_sign=sign,

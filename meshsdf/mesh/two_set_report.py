@@ -44,6 +44,9 @@ class TwoSetReport:
     certain_beyond : float
         World units. Fill every hole in any way inside the convex hull of its rim: no point further
         than this from all rims changes sides (see `holes`). 0 for a two-set mesh.
+    crack_width : float or None
+        World units. Moving rim vertices by no more than this closes the mesh; None if it is
+        closed, or if its holes are wider than cracks (see `crack_repair`).
     components : tuple of Component
         In order of their first faces.
     n_degenerate_faces : int
@@ -80,6 +83,7 @@ class TwoSetReport:
     open_edge_share: float
     holes: tuple[Hole, ...]
     certain_beyond: float
+    crack_width: float | None
     components: tuple[Component, ...]
     n_degenerate_faces: int
     n_duplicate_faces: int

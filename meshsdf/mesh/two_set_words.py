@@ -15,6 +15,7 @@ def report_to_json(report: TwoSetReport) -> dict:
     }
     return plain | {
         "n_components": report.n_components,
+        "crack_width": report.crack_width,
         "holes": [
             {
                 "length": hole.length,
@@ -105,6 +106,11 @@ def _open_words(report: TwoSetReport) -> list[str]:
         f"{'it is' if n == 1 else 'they are'} filled (within the convex hull of "
         f"{'the' if n == 1 else 'each'} rim)."
     )
+    if report.crack_width is not None:
+        words.append(
+            f"{'It is only a crack' if n == 1 else 'They are only cracks'}: moving vertices by "
+            f"{report.crack_width:.2g} units closes the mesh."
+        )
     if report.n_tjunction_edges:
         words.append(
             f"{_count(report.n_tjunction_edges, 'more edge')} only look open: they cancel exactly "

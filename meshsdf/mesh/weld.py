@@ -5,6 +5,7 @@ as STL repeat a vertex for every face, and this is what ties their faces togethe
 """
 
 import numpy as np
+from jaxtyping import Float64
 
 from ..arrays import Indices, Points
 from ..kernels.weld import number_rows
@@ -27,7 +28,7 @@ def number_equal_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return labels, first_row[:n_different].copy()
 
 
-def weld(vertices: Points) -> tuple[Indices, Points]:
+def weld(vertices: Points) -> tuple[Indices, Float64[np.ndarray, "u 3"]]:
     """Merge vertices at exactly equal positions.
 
     Parameters

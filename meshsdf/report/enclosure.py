@@ -29,6 +29,11 @@ class Enclosure:
         """How much is not known."""
         return self.upper - self.lower
 
+    @property
+    def middle(self) -> float:
+        """Halfway between both ends."""
+        return 0.5 * self.lower + 0.5 * self.upper
+
     def contains(self, value: float) -> bool:
         """Tell whether ``lower <= value <= upper``."""
         return self.lower <= value <= self.upper

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Values
+from ..arrays import Number, Values
 from ..errors import ReportError
 from ..mesh import Mesh
 from ..mesh.two_set import TwoSetReport, check
@@ -80,12 +80,12 @@ class RoundTrip:
 
 def roundtrip(
     mesh: Mesh,
-    resolutions: Sequence[float],
+    resolutions: Sequence[Number],
     *,
     sign: SignMethod = "auto",
-    half_width: float = 3.0,
+    half_width: Number = 3.0,
     report: TwoSetReport | None = None,
-    max_memory: float | None = None,
+    max_memory: Number | None = None,
     progress: Progress = silent,
 ) -> RoundTrip:
     """Convert a mesh to a narrow band and back, and measure what was lost.
@@ -125,7 +125,7 @@ def roundtrip(
     return RoundTrip(tuple(_row(mesh, resolution, options) for resolution in resolutions))
 
 
-def _row(mesh: Mesh, resolution: float, options: dict) -> RoundTripRow:
+def _row(mesh: Mesh, resolution: Number, options: dict) -> RoundTripRow:
     marks = [time.perf_counter()]
     band = mesh_to_band(mesh, resolution=resolution, **options)
     marks.append(time.perf_counter())
@@ -144,7 +144,7 @@ def _row(mesh: Mesh, resolution: float, options: dict) -> RoundTripRow:
     spent = np.round(np.diff(marks), 4).tolist()
     seconds = dict(zip(("distance", "surface", "compare"), spent, strict=True))
     return RoundTripRow(
-        resolution, band.voxel_size, comparison, surface, band.sign, warnings, seconds
+        float(resolution), band.voxel_size, comparison, surface, band.sign, warnings, seconds
     )
 
 

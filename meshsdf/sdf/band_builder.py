@@ -1,4 +1,4 @@
-"""Build a narrow band slab by slab: mark bricks, scan distances, count crossings, keep what is near.
+"""Build a narrow band slab by slab: mark bricks, count crossings, scan distances, keep the near.
 
 A slab is a run of brick columns along x. Slabs share nothing but the page table, where each
 writes its own entries, so they run on all cores and need scratch memory for a few slabs only.
@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from ..arrays import Number
 from ..grid import BrickIndex, NarrowBand
 from ..kernels.band_distance import scan_edges, scan_faces, scan_vertices
 from ..kernels.brick_finish import closest_in_bricks, keep_active, renumber
@@ -16,7 +17,6 @@ from ..kernels.brick_lookup import OUTSIDE
 from ..kernels.brick_marks import bin_by_x, extents_x, list_bricks, mark_cells
 from ..kernels.crossings import count_crossings, resolve_signs
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
-from ..kernels.point_triangle import FRAME_SIZE, build_frames
 from ..progress import Progress
 from .lattice import Lattice
 from .memory import BYTES_PER_BRICK, BYTES_PER_BRICK_CLOSEST, SCRATCH_PER_BRICK, require_memory
@@ -37,7 +37,7 @@ class BandBuilder:
     half_width: float
     sign: str
     closest: bool
-    max_memory: float | None
+    max_memory: Number | None
     progress: Progress
     root: np.ndarray = field(init=False)
     pages: np.ndarray = field(init=False)
@@ -124,13 +124,9 @@ class BandBuilder:
         self.kept = np.empty(n, np.int64)
         self.n_kept = [0] * len(self.slabs)
         self.leaks = [0] * len(self.slabs)
-        self.frames = np.empty((0, FRAME_SIZE))
         if self.closest:
             self.closest_face = np.empty((n, 512), np.int32)
             self.barycentric = np.empty((n, 512, 2), np.float32)
-            corners = self.placed.points[self.placed.faces]
-            self.frames = np.empty((len(corners), FRAME_SIZE))
-            build_frames(corners, np.arange(len(corners)), 0, len(corners), self.frames)
 
     def _fill_slab(self, s: int) -> None:
         a, b = self.slot0[s], self.slot0[s + 1]
@@ -157,7 +153,8 @@ class BandBuilder:
                 self.coordinates[a : a + n],
                 nearest[self.kept[a : a + n]],
                 self.active[a : a + n],
-                self.frames,
+                self.placed.points,
+                self.placed.faces,
                 self.placed.face_ids,
                 self.closest_face[a : a + n],
                 self.barycentric[a : a + n],

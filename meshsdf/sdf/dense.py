@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..arrays import Vector3
+from ..arrays import Number, Vector3
 from ..grid import Grid, NarrowBand
 from ..mesh import Mesh
 from ..mesh.two_set import TwoSetReport
@@ -18,13 +18,13 @@ NODES_AT_ONCE = 1 << 20
 def mesh_to_grid(
     mesh: Mesh,
     *,
-    resolution: float | None = None,
-    voxel_size: float | None = None,
-    half_width: float = 3.0,
+    resolution: Number | None = None,
+    voxel_size: Number | None = None,
+    half_width: Number = 3.0,
     sign: SignMethod = "auto",
     translation: Vector3 | None = None,
     report: TwoSetReport | None = None,
-    max_memory: float | None = None,
+    max_memory: Number | None = None,
     progress: Progress = silent,
 ) -> Grid:
     """Sample the signed distance to a mesh on every node of its box, grown by ``half_width``.
@@ -56,7 +56,7 @@ def mesh_to_grid(
     planes = max(1, int(NODES_AT_ONCE // np.prod(shape[1:])))
     for i in range(0, shape[0], planes):
         last = min(i + planes, shape[0])
-        ijk = np.indices((last - i, *shape[1:])).reshape(3, -1).T + (first + [i, 0, 0])
+        ijk = np.indices((last - i, *shape[1:])).reshape(3, -1).T + first + np.array([i, 0, 0])
         values[i:last] = _distances(band, query, ijk).reshape(last - i, *shape[1:])
         progress("far field", last / shape[0])
     return Grid(values, band.voxel_size, band.to_world(first[None])[0], band.sign)

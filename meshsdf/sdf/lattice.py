@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Ijk1, Points, Vector3
+from ..arrays import Ijk1, Number, Points, Vector3
 from ..errors import SdfError
 from ..grid.brick_index import BRICK, PAGE
 from ..mesh import Mesh
@@ -40,7 +40,7 @@ class Lattice:
 
     @classmethod
     def around(
-        cls, points: Points, voxel_size: float, translation: Vector3, reach: float
+        cls, points: Points, voxel_size: Number, translation: Vector3, reach: Number
     ) -> "Lattice":
         """Return the pages that hold every node within ``reach`` voxels of the points' box.
 
@@ -79,7 +79,7 @@ class Lattice:
         return self.voxel_size * self.origin_ijk + self.translation
 
 
-def resolve_voxel_size(mesh: Mesh, resolution: float | None, voxel_size: float | None) -> float:
+def resolve_voxel_size(mesh: Mesh, resolution: Number | None, voxel_size: Number | None) -> float:
     """Return the voxel size asked for, directly or as the box's longest side / resolution.
 
     Raises

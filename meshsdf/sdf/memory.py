@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import Number
 from ..errors import MemoryLimitError
 from ..grid.brick_index import BRICK
 
@@ -26,7 +27,9 @@ def available_memory() -> int | None:
         return None
 
 
-def estimate_bricks(areas: np.ndarray, sides: np.ndarray, voxel_size: float, reach: float) -> float:
+def estimate_bricks(
+    areas: np.ndarray, sides: np.ndarray, voxel_size: Number, reach: Number
+) -> float:
     """Expected number of bricks within ``reach`` voxels of faces with these areas.
 
     A sheet of area A, 2 r thick, meets A (2 r + 8 (|nx| + |ny| + |nz|)) / 512 bricks; the mean of
@@ -39,7 +42,7 @@ def estimate_bricks(areas: np.ndarray, sides: np.ndarray, voxel_size: float, rea
     return min(boxed, sheet + float(((2 * reach + BRICK) / BRICK) ** 3))
 
 
-def require_memory(needed: float, max_memory: float | None, *, where: str) -> None:
+def require_memory(needed: Number, max_memory: Number | None, *, where: str) -> None:
     """Refuse work that needs more bytes than allowed.
 
     Raises

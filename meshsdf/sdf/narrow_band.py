@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..arrays import Vector3
+from ..arrays import Number, Vector3
 from ..errors import SdfError
 from ..grid import NarrowBand
 from ..mesh import Mesh
@@ -29,14 +29,14 @@ MAX_HALF_WIDTH = 1000.0
 def mesh_to_band(
     mesh: Mesh,
     *,
-    resolution: float | None = None,
-    voxel_size: float | None = None,
-    half_width: float = 3.0,
+    resolution: Number | None = None,
+    voxel_size: Number | None = None,
+    half_width: Number = 3.0,
     sign: SignMethod = "auto",
     translation: Vector3 | None = None,
     closest: bool = False,
     report: TwoSetReport | None = None,
-    max_memory: float | None = None,
+    max_memory: Number | None = None,
     progress: Progress = silent,
 ) -> NarrowBand:
     """Sample the signed distance to a mesh on all lattice nodes nearer than ``half_width`` voxels.
@@ -92,6 +92,7 @@ def mesh_to_band(
     """
     size = resolve_voxel_size(mesh, resolution, voxel_size)
     _check_half_width(half_width)
+    half_width = float(half_width)
     origin = np.zeros(3) if translation is None else np.asarray(translation, np.float64)
     _check_memory(mesh, size, half_width, closest, max_memory)
     if report is None:
@@ -112,7 +113,7 @@ def mesh_to_band(
     return sign_by_winding_number(band, mesh, max_memory=max_memory, progress=progress)
 
 
-def _check_half_width(half_width: float) -> None:
+def _check_half_width(half_width: Number) -> None:
     if not MIN_HALF_WIDTH <= half_width <= MAX_HALF_WIDTH:
         raise SdfError(
             f"half_width is {half_width:g} voxels",
@@ -122,7 +123,7 @@ def _check_half_width(half_width: float) -> None:
 
 
 def _check_memory(
-    mesh: Mesh, size: float, half_width: float, closest: bool, max_memory: float | None
+    mesh: Mesh, size: float, half_width: Number, closest: bool, max_memory: Number | None
 ) -> None:
     per_brick = BYTES_PER_BRICK + (BYTES_PER_BRICK_CLOSEST if closest else 0)
     n_bricks = estimate_bricks(face_areas(mesh), mesh.box.size, size, half_width)

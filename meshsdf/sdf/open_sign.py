@@ -10,6 +10,7 @@ from brick to brick through the faces on which the sign changes.
 import numpy as np
 from scipy import ndimage
 
+from ..arrays import Number
 from ..grid import BrickIndex, NarrowBand
 from ..grid.brick_index import BRICK
 from ..mesh import Mesh
@@ -21,7 +22,7 @@ BRICKS_AT_ONCE = 4096  # 2 M points, 50 MB
 
 
 def sign_by_winding_number(
-    band: NarrowBand, mesh: Mesh, *, max_memory: float | None, progress: Progress
+    band: NarrowBand, mesh: Mesh, *, max_memory: Number | None, progress: Progress
 ) -> NarrowBand:
     """Return the unsigned band with signs, and with bricks added along the membranes.
 
@@ -79,7 +80,7 @@ def _inner_bricks(band: NarrowBand, mesh: Mesh, coordinates: np.ndarray) -> np.n
     low = coordinates.min(axis=0) - 1
     missing = np.ones(coordinates.max(axis=0) - low + 2, bool)
     missing[tuple((coordinates - low).T)] = False
-    regions, n = ndimage.label(missing, structure=np.ones((3, 3, 3)))
+    regions, _ = ndimage.label(missing, structure=np.ones((3, 3, 3)))
     outer = regions[0, 0, 0]
     flat = regions.ravel()
     _, first = np.unique(flat, return_index=True)
@@ -96,7 +97,7 @@ def _signed(band: NarrowBand, index: BrickIndex, inside: np.ndarray) -> NarrowBa
     """The band on a larger index; new bricks are empty but for their sign."""
     old = index.lookup(band.index.coordinates)
 
-    def spread(array: np.ndarray | None, empty: float) -> np.ndarray | None:
+    def spread(array: np.ndarray | None, empty: Number) -> np.ndarray | None:
         if array is None:
             return None
         wide = np.full((index.n_bricks, *array.shape[1:]), empty, array.dtype)

@@ -154,7 +154,16 @@ def test_one_vertex_moved_by_one_ulp_in_a_soup_opens_a_crack():
 def test_a_long_edge_may_meet_several_short_ones_and_gaps_are_found_on_the_line():
     # Along the x axis: one edge 0..8 against edges 0..2, 2..4, 5..8: the gap 4..5 survives.
     top = [(0, 0, 0), (8, 0, 0), (4, 1, 0)]
-    low = [(0, 0, 0), (2, 0, 0), (1, -1, 0), (4, 0, 0), (3, -1, 0), (5, 0, 0), (8, 0, 0), (6, -1, 0)]
+    low = [
+        (0, 0, 0),
+        (2, 0, 0),
+        (1, -1, 0),
+        (4, 0, 0),
+        (3, -1, 0),
+        (5, 0, 0),
+        (8, 0, 0),
+        (6, -1, 0),
+    ]
     mesh = make([*top, *low], [(0, 1, 2), (4, 3, 5), (6, 4, 7), (9, 8, 10)])
     report = check(mesh, self_intersections=False)
     on_axis = [
@@ -166,9 +175,7 @@ def test_a_long_edge_may_meet_several_short_ones_and_gaps_are_found_on_the_line(
     assert on_axis == [[4.0, 5.0]]
 
 
-lattice_points = st.lists(
-    st.tuples(*[st.integers(0, 2)] * 3), min_size=4, max_size=9, unique=False
-)
+lattice_points = st.lists(st.tuples(*[st.integers(0, 2)] * 3), min_size=4, max_size=9, unique=False)
 
 
 @settings(max_examples=150, deadline=None)

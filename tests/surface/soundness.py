@@ -4,6 +4,15 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from meshsdf.mesh import Mesh
+
+
+def joined(meshes):
+    """All meshes as one, so that many small ones are judged at once."""
+    first = np.cumsum([0] + [mesh.n_vertices for mesh in meshes])
+    faces = [mesh.faces + np.int32(n) for mesh, n in zip(meshes, first[:-1], strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
 
 def directed_edges(faces):
     """(3 m,) start and end of every side of every face."""
@@ -14,26 +23,30 @@ def directed_edges(faces):
 def open_edges(mesh):
     """(n, 2) sides that no other face runs through in the opposite direction."""
     start, end = directed_edges(mesh.faces)
-    alone = ~np.isin(start * mesh.n_vertices + end, end * mesh.n_vertices + start)
-    return np.stack([start, end], axis=1)[alone]
+    key, reverse = start * mesh.n_vertices + end, np.sort(end * mesh.n_vertices + start)
+    at = np.searchsorted(reverse, key).clip(max=max(len(key) - 1, 0))
+    return np.stack([start, end], axis=1)[reverse[at] != key]
 
 
 def assert_manifold(mesh):
     """Oriented, edge- and vertex-manifold up to open edges; nothing unused, nothing twice."""
     n = mesh.n_vertices
-    assert np.array_equal(np.unique(mesh.faces), np.arange(n)), "a vertex is unused"
+    is_used = np.zeros(n, bool)
+    is_used[mesh.faces] = True
+    assert is_used.all(), "a vertex is unused"
     start, end = directed_edges(mesh.faces)
     assert (start != end).all(), "a face names a vertex twice"
-    key = start * n + end
-    assert len(np.unique(key)) == len(key), "an edge is used twice in one direction"
-    assert len(np.unique(np.sort(mesh.faces, axis=1), axis=0)) == mesh.n_faces, "a duplicate face"
+    key = np.sort(start * n + end)
+    assert (key[1:] != key[:-1]).all(), "an edge is used twice in one direction"
+    corners = np.sort(mesh.faces, axis=1)
+    corners = corners[np.lexsort(corners.T)]
+    assert (corners[1:] != corners[:-1]).any(axis=1).all(), "a duplicate face"
     # The link of vertex v has a node for every edge at v and a side for every face at v.
-    ends = np.unique(np.concatenate([key, end * n + start]))
-    corner = (
-        np.roll(mesh.faces.astype(np.int64), -1, axis=1).ravel(),
-        np.roll(mesh.faces.astype(np.int64), -2, axis=1).ravel(),
-    )
-    a, b = (np.searchsorted(ends, start * n + other) for other in corner)
+    ends = np.sort(np.concatenate([key, end * n + start]))
+    ends = ends[np.r_[True, ends[1:] != ends[:-1]]]
+    faces = mesh.faces.astype(np.int64)
+    others = (np.roll(faces, -turn, axis=1).ravel() for turn in (1, 2))
+    a, b = (np.searchsorted(ends, start * n + other) for other in others)
     link = coo_array((np.ones(len(a), bool), (a, b)), shape=(len(ends), len(ends)))
     n_links, _ = connected_components(link, directed=False)
     assert n_links == n, "the faces around a vertex form more than one fan"

@@ -1,0 +1,71 @@
+"""``meshsdf info``: what is in a file."""
+
+import os
+
+import click
+
+from .console import YES, Console, file_size, plural
+from .options import json_option, path
+
+
+@click.command(epilog="Example: meshsdf info bunny.npz")
+@click.argument("file", type=path)
+@json_option
+def command(file: str, as_json: bool) -> int:
+    """What is in FILE, a mesh or a volume. Volumes are described from their headers."""
+    console = Console("info", as_json=as_json)
+    from ..io import kind_of, probe_volume
+
+    if kind_of(file) == "volume":
+        facts = probe_volume(file)
+        console.result(_volume_words(file, facts))
+        console.json({"input": file, "bytes": os.path.getsize(file)} | facts)
+        return YES
+    from ..io import read_mesh
+
+    warnings: list[str] = []
+    loaded = read_mesh(file, warn=warnings.append)
+    box = loaded.box
+    facts = {
+        "kind": "mesh",
+        "n_vertices": loaded.n_vertices,
+        "n_faces": loaded.n_faces,
+        "lower": box.lower.tolist(),
+        "upper": box.upper.tolist(),
+        "has_uv": loaded.uv is not None,
+        "has_vertex_colors": loaded.vertex_colors is not None,
+        "materials": [material.name for material in loaded.materials],
+        "n_images": sum(material.image is not None for material in loaded.materials),
+    }
+    for warning in warnings:
+        console.say(f"warning: {warning}")
+    console.result(_mesh_words(file, facts))
+    head = {"input": file, "bytes": os.path.getsize(file)}
+    console.json(head | facts | {"warnings": warnings})
+    return YES
+
+
+def _mesh_words(file: str, facts: dict) -> str:
+    carried = [
+        text
+        for text, has in (
+            ("uv", facts["has_uv"]),
+            ("vertex colours", facts["has_vertex_colors"]),
+            (plural(len(facts["materials"]), "material"), facts["materials"]),
+            (plural(facts["n_images"], "image"), facts["n_images"]),
+        )
+        if has
+    ]
+    ranges = zip("xyz", facts["lower"], facts["upper"], strict=True)
+    return (
+        f"{file}: mesh, {plural(facts['n_vertices'], 'vertex', 'vertices')}, "
+        f"{plural(facts['n_faces'], 'face')}, {file_size(os.path.getsize(file))}\n"
+        + "  ".join(f"{axis} {low:.6g} to {high:.6g}" for axis, low, high in ranges)
+        + f"\ncarries: {', '.join(carried) or 'shape only'}"
+    )
+
+
+def _volume_words(file: str, facts: dict) -> str:
+    lines = [f"{file}: {facts['kind']}, {file_size(os.path.getsize(file))}"]
+    lines += [f"  {key}: {value}" for key, value in facts.items() if key != "kind"]
+    return "\n".join(lines)

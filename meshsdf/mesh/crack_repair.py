@@ -1,0 +1,96 @@
+"""Cracks: rims that meet but for rounding, and how far vertices must move to close them.
+
+Files written by CAD programs often repeat a corner with slightly different numbers. Exactly read,
+such a mesh is open: the crack is real, only its width is not worth a sign. Here the vertices of
+open edges are welded within a distance that gives each of them a partner, as long as that is less than
+half of every open edge, or within rounding, so that cracks are zipped but no hole is collapsed.
+
+If two repairs that move no vertex by more than w both close a mesh, they agree on inside and
+outside at every point further than w from it, given that the w-neighbourhood of its open edges
+does not cut space apart: the prism between the two repairs stays within w of the mesh, and what
+the open edges sweep stays within w of them. So the width is also the distance beyond which the
+sign is certain.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..arrays import Faces, Indices, Points
+from .edge_chain import residual_lines
+from .edge_table import edge_table
+
+HALF = 0.49  # of the shortest open edge: below one half, so that no edge collapses
+ROUNDING = 10.0 ** np.arange(-15, -6)  # of the mesh's size: edges this short may collapse
+
+
+@dataclass(frozen=True, eq=False)
+class CrackRepair:
+    """A weld of nearby vertices that closes a mesh.
+
+    Attributes
+    ----------
+    labels : (u,) int32
+        For each welded vertex, the one that stands for it.
+    width : float
+        World units; no vertex moves further.
+    oriented : bool
+        The closed mesh is oriented.
+    """
+
+    labels: Indices
+    width: float
+    oriented: bool
+
+
+def close_cracks(points: Points, faces: Faces, segments: np.ndarray) -> CrackRepair | None:
+    """Weld the ends of open segments within a small distance; None unless that closes the mesh.
+
+    Parameters
+    ----------
+    points, faces
+        Welded at equal positions.
+    segments : (s, 2) int
+        What is left of the boundary, as vertices.
+    """
+    rim = np.unique(segments)
+    tree = cKDTree(points[rim])
+    shortest = np.linalg.norm(points[segments[:, 0]] - points[segments[:, 1]], axis=1).min()
+    partner = tree.query(points[rim], k=2)[0][:, 1].max()
+    size = np.ptp(points[rim], axis=0).max()
+    widths = [width for width in (partner,) if width < HALF * shortest]
+    for width in sorted([*widths, *(ROUNDING * size)]):
+        repair = _weld_within(width * (1 + 1e-9), tree, rim, points, faces)
+        if repair is not None:
+            return repair
+    return None
+
+
+def _weld_within(
+    width: float, tree: cKDTree, rim: np.ndarray, points: np.ndarray, faces: np.ndarray
+) -> CrackRepair | None:
+    pairs = tree.query_pairs(width, output_type="ndarray")
+    if len(pairs) == 0:
+        return None
+    labels = _weld_pairs(pairs, rim, len(points))
+    table = edge_table(labels[faces], len(points))
+    lines = None if table.is_balanced else residual_lines(table, points)
+    if lines is not None and len(lines.survivors(points)):
+        return None
+    moved = np.linalg.norm(points - points[labels], axis=1).max()
+    return CrackRepair(labels, float(moved), lines is None or lines.is_balanced())
+
+
+def _weld_pairs(pairs: np.ndarray, rim: np.ndarray, n_points: int) -> np.ndarray:
+    """Label every vertex by the lowest of those it is linked to."""
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(rim),) * 2)
+    cluster = connected_components(links, directed=False)[1]
+    lowest = np.full(cluster.max() + 1, n_points)
+    np.minimum.at(lowest, cluster, rim)
+    labels = np.arange(n_points, dtype=np.int32)
+    labels[rim] = lowest[cluster]
+    return labels
+

@@ -1,0 +1,77 @@
+"""Pictures of a round trip: the error against resolution, and both surfaces side by side.
+
+matplotlib draws without a display; the same input gives the same bytes.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from ..mesh import Mesh
+from ..mesh.measures import face_normals
+from .roundtrip import RoundTrip
+
+INK, BLUE, ORANGE, GREY = "#222222", "#0072b2", "#d55e00", "#9a9a9a"  # Okabe and Ito 2008
+LIGHT = np.array([0.35, -0.6, 0.72])
+PNG_OPTIONS = {"dpi": 144, "metadata": {"Software": None}}
+
+
+def draw_errors(trip: RoundTrip, path: Path, *, title: str) -> None:
+    """Write a PNG of the Hausdorff interval and the mean distance against voxel size, log-log."""
+    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    sizes = np.array([row.voxel_size for row in trip.rows])
+    lower = np.array([row.comparison.distance.lower for row in trip.rows])
+    upper = np.array([row.comparison.distance.upper for row in trip.rows])
+    mean = np.array([row.comparison.forward.mean for row in trip.rows])
+    axes.fill_between(sizes, lower, upper, color=BLUE, alpha=0.3, linewidth=0)
+    axes.plot(sizes, upper, "o-", color=BLUE, label="largest distance (certified interval)")
+    axes.plot(sizes, mean, "s-", color=ORANGE, label="mean distance, mesh to round trip")
+    axes.plot(sizes, sizes, ":", color=GREY, label="one voxel")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xticks(sizes, [f"{size:.3g}\n1/{row.resolution:g}" for size, row in _pairs(trip)])
+    axes.minorticks_off()
+    axes.set_xlabel("voxel size, world units, and resolution")
+    axes.set_ylabel("distance, world units")
+    order = "" if trip.order is None else f": observed order {trip.order:.2f}"
+    axes.set_title(title + order, color=INK, fontsize=11)
+    axes.grid(color="#e4e4e4")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False)
+    figure.savefig(path, **PNG_OPTIONS)
+
+
+def draw_surfaces(meshes: list[tuple[str, Mesh]], path: Path) -> None:
+    """Write a PNG of meshes side by side, shaded by one light, at one scale."""
+    figure = Figure(figsize=(5.2 * len(meshes), 5.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    box = meshes[0][1].box
+    half = 0.36 * box.longest_side
+    for column, (title, mesh) in enumerate(meshes):
+        axes = figure.add_subplot(1, len(meshes), column + 1, projection="3d")
+        shade = 0.35 + 0.65 * np.clip(face_normals(mesh) @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1)
+        colors = np.clip(shade[:, None] * np.array([0.55, 0.72, 0.86]), 0, 1)
+        _add_triangles(axes, mesh.triangles, colors)
+        for axis, center in zip("xyz", box.center, strict=True):
+            getattr(axes, f"set_{axis}lim")(center - half, center + half)
+        axes.set_box_aspect((1, 1, 1), zoom=1.2)
+        axes.view_init(elev=38, azim=-60)
+        axes.set_axis_off()
+        axes.set_title(title, color=INK, fontsize=11)
+    figure.savefig(path, **PNG_OPTIONS)
+
+
+def _add_triangles(axes, triangles: np.ndarray, colors: np.ndarray) -> None:
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    axes.add_collection3d(
+        Poly3DCollection(triangles, facecolors=colors, edgecolors=colors, linewidths=0.2)
+    )
+
+
+def _pairs(trip: RoundTrip):
+    return ((row.voxel_size, row) for row in trip.rows)

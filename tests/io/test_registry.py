@@ -1,0 +1,52 @@
+"""meshsdf.io.registry: a suffix names a format."""
+
+import numpy as np
+import pytest
+
+from meshsdf.errors import IoError
+from meshsdf.grid import Grid
+from meshsdf.io import read_volume, write_volume
+from meshsdf.io.registry import FORMATS, format_of, suffixes
+from meshsdf.io.volumes import probe_volume
+
+
+def test_every_format_names_functions_that_exist():
+    for format in FORMATS:
+        for name in (format.reader, format.writer, format.prober):
+            assert name == "" or callable(format.function(name))
+
+
+def test_no_suffix_belongs_to_two_formats():
+    assert len(set(suffixes())) == len(suffixes())
+    assert set(suffixes("mesh")) | set(suffixes("volume")) == set(suffixes())
+    assert {".obj", ".ply", ".stl", ".off", ".glb", ".gltf"} <= set(suffixes("mesh"))
+    assert ".npz" in suffixes("volume")
+
+
+def test_capitals_do_not_matter():
+    assert format_of("A.STL").name == "STL"
+    assert format_of("a.Npz", "volume").name == "NPZ volume"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"), [("a.stel", ".stl"), ("a.objj", ".obj"), ("a.glbf", ".glb")]
+)
+def test_a_slip_gets_the_nearest_suffix_suggested(wrong, right):
+    with pytest.raises(IoError, match=rf"did you mean \{right}\?"):
+        format_of(wrong, "mesh")
+
+
+def test_a_mesh_is_no_volume():
+    with pytest.raises(IoError, match=r"a volume with suffix '\.obj' cannot be read"):
+        read_volume("a.obj")
+    with pytest.raises(IoError, match=r"use one of \.npz"):
+        write_volume("a.xyz", Grid(np.zeros((1, 1, 1)), 1.0, np.zeros(3)))
+
+
+def test_volumes_pass_through_by_suffix(tmp_path):
+    path = tmp_path / "a.npz"
+    write_volume(path, Grid(np.ones((2, 2, 2)), 1.0, np.zeros(3)), half=True)
+    assert read_volume(path).values.dtype == np.float32
+    assert probe_volume(path)["dtype"] == "float16"
+    with pytest.raises(IoError, match="the output exists"):
+        write_volume(path, Grid(np.ones((2, 2, 2)), 1.0, np.zeros(3)))
