@@ -33,7 +33,7 @@ FILES = sorted(ROOT.rglob("*.py"))
 def room_of(path: Path) -> str:
     """First folder (or module) below the package; empty for the package's own __init__."""
     parts = path.relative_to(ROOT).with_suffix("").parts
-    return "" if parts == ("__init__",) else parts[0]
+    return "" if parts in (("__init__",), ("__main__",)) else parts[0]
 
 
 def imports(path: Path):

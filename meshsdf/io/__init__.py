@@ -1,19 +1,38 @@
 """One file format each: meshes and volumes in and out.
 
-The four functions are imported when first asked for, so that a command which reads meshes does
-not wait for what only volumes need.
+Its functions are imported when first asked for, so that a command which reads meshes does not
+wait for what only volumes need.
 """
 
 from importlib import import_module
 
 _HOMES = {
+    "atomic_write": "atomic",
+    "check_output": "atomic",
+    "kind_of": "registry",
+    "make_folder": "atomic",
+    "probe_volume": "volumes",
     "read_mesh": "meshes",
-    "write_mesh": "meshes",
     "read_volume": "volumes",
+    "suffixes": "registry",
+    "write_mesh": "meshes",
+    "write_text": "atomic",
     "write_volume": "volumes",
 }
 
-__all__ = ["read_mesh", "read_volume", "write_mesh", "write_volume"]
+__all__ = [
+    "atomic_write",
+    "check_output",
+    "kind_of",
+    "make_folder",
+    "probe_volume",
+    "read_mesh",
+    "read_volume",
+    "suffixes",
+    "write_mesh",
+    "write_text",
+    "write_volume",
+]
 
 
 def __getattr__(name: str):

@@ -13,12 +13,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import IoError
+from .registry import Kind, format_of
 
 _FULL = {errno.ENOSPC, errno.EDQUOT}
 _NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EACCES}
 
 
-def check_output(path: str | os.PathLike, force: bool) -> None:
+def check_output(path: str | os.PathLike, force: bool = False, *, kind: Kind | None = None) -> None:
     """Refuse a place that cannot be written, before any work starts.
 
     Parameters
@@ -27,13 +28,17 @@ def check_output(path: str | os.PathLike, force: bool) -> None:
         The file to be written.
     force : bool
         Whether an existing file may be replaced.
+    kind : "mesh", "volume" or None
+        If given, the suffix must be one that such things are written with.
 
     Raises
     ------
     IoError
-        The file exists and ``force`` is false, it is a folder or a device, its folder is missing
-        or does not allow new files.
+        The suffix does not suit the kind, the file exists and ``force`` is false, it is a folder
+        or a device, its folder is missing or does not allow new files.
     """
+    if kind is not None:
+        format_of(path, kind, "writer")
     target = _target(path)
     where = f"output {path}"
     folder = target.parent
@@ -98,8 +103,31 @@ def atomic_write(path: str | os.PathLike, force: bool = False) -> Iterator[Path]
             temporary.unlink(missing_ok=True)
 
 
+def write_text(path: str | os.PathLike, text: str, *, force: bool = False) -> None:
+    """Write a text file (UTF-8) as `atomic_write` does; IoError as there."""
+    with atomic_write(path, force) as temporary:
+        temporary.write_bytes(text.encode("utf-8", "replace"))
+
+
+def make_folder(path: str | os.PathLike) -> Path:
+    """Return the folder, made with its parents if it is missing; IoError if that cannot be."""
+    folder = _target(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        what = "a file stands where the folder should be"
+        raise IoError(what, f"folder {path}", "name another folder") from None
+    except OSError as error:
+        raise IoError(
+            f"the folder cannot be made: {error.strerror}", f"folder {path}", "name another folder"
+        ) from error
+    return Path(path)
+
+
 def _target(path: str | os.PathLike) -> Path:
     """The file behind a symbolic link, so that the link itself survives."""
+    if "\0" in os.fspath(path):
+        raise IoError("no file can have a zero byte in its name", f"output {path!r}", "rename it")
     return Path(os.path.realpath(path))
 
 

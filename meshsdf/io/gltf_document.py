@@ -41,22 +41,27 @@ class Document:
 
     def items(self, name: str) -> list:
         """Return a top-level list of the JSON, such as "nodes"; empty if it is absent."""
-        return self.json.get(name, [])
+        entries = self.json.get(name, [])
+        if not isinstance(entries, list):
+            raise ValueError(f"its {name} are not a list")
+        return entries
 
-    def item(self, name: str, index: int) -> dict:
+    def item(self, name: str, index: object) -> dict:
         """Return one entry of a top-level list; ValueError if there is no such entry."""
         entries = self.items(name)
         if not (isinstance(index, int) and 0 <= index < len(entries)):
-            raise ValueError(f"it refers to {name}[{index}], but there are {len(entries)}")
+            raise ValueError(f"it refers to {name}[{index!r}], but there are {len(entries)}")
+        if not isinstance(entries[index], dict):
+            raise ValueError(f"its {name}[{index}] is not an object")
         return entries[index]
 
-    def view(self, index: int) -> bytes | memoryview:
+    def view(self, index: object) -> bytes | memoryview:
         """Return the bytes of a buffer view."""
         view = self.item("bufferViews", index)
         data = memoryview(self._buffer(view["buffer"]))
         return _part(data, view.get("byteOffset", 0), view["byteLength"], f"buffer view {index}")
 
-    def array(self, index: int) -> np.ndarray:
+    def array(self, index: object) -> np.ndarray:
         """Return what an accessor describes, (count, width); normalized integers as float64."""
         accessor = self.item("accessors", index)
         width = _WIDTHS[accessor["type"]]
@@ -77,8 +82,10 @@ class Document:
             return np.maximum(values / np.iinfo(dtype).max, -1.0)
         return values
 
-    def file(self, uri: str) -> bytes | Path:
+    def file(self, uri: object) -> bytes | Path:
         """Return the bytes of a data URI, or the path of a file beside the document."""
+        if not isinstance(uri, str):
+            raise ValueError(f"it refers to the file {uri!r}")
         if uri.startswith("data:"):
             head, _, body = uri.partition(",")
             if not head.endswith(";base64"):
@@ -90,9 +97,9 @@ class Document:
                 return path
         raise ValueError(f"the file {uri[:80]!r} that it needs is missing")
 
-    def _buffer(self, index: int) -> bytes:
+    def _buffer(self, index: object) -> bytes:
+        buffer = self.item("buffers", index)
         if index not in self._buffers:
-            buffer = self.item("buffers", index)
             if "uri" in buffer:
                 found = self.file(buffer["uri"])
                 data = found.read_bytes() if isinstance(found, Path) else found
@@ -100,7 +107,7 @@ class Document:
                 data = self.binary
             else:
                 raise ValueError(f"buffer {index} has no data")
-            if len(data) < buffer["byteLength"]:
+            if len(data) < _size(buffer["byteLength"], "length of a buffer"):
                 claim = f"buffer {index} promises {buffer['byteLength']} bytes"
                 raise ValueError(f"{claim}, but has {len(data)}")
             self._buffers[index] = data
@@ -174,7 +181,7 @@ def _size(value: object, what: str) -> int:
     return value
 
 
-def _part(data: memoryview, offset: int, length: int, what: str) -> memoryview:
+def _part(data: memoryview, offset: object, length: object, what: str) -> memoryview:
     """A slice that must lie within the data."""
     end = _size(offset, f"offset of {what}") + _size(length, f"length of {what}")
     if end > len(data):

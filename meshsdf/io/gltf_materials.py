@@ -8,7 +8,7 @@ from .images import read_image
 from .warn import Warn
 
 
-def texture_set(document: Document, material: int) -> int:
+def texture_set(document: Document, material: object) -> int:
     """Return which set of texture coordinates the base colour image of a material uses."""
     if material == -1:
         return 0
@@ -39,7 +39,7 @@ def read_materials(document: Document, used: set[int], warn: Warn) -> tuple[Mate
     return tuple(materials)
 
 
-def _base(entry: dict) -> tuple[list, dict]:
+def _base(entry: dict) -> tuple[object, dict]:
     """Colour factor and texture of the base colour, in either of the two ways of writing it."""
     older = entry.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
     if older is not None and "pbrMetallicRoughness" not in entry:
@@ -48,7 +48,7 @@ def _base(entry: dict) -> tuple[list, dict]:
     return shading.get("baseColorFactor", [1, 1, 1, 1]), shading.get("baseColorTexture", {})
 
 
-def _image_index(document: Document, texture: dict) -> int | None:
+def _image_index(document: Document, texture: dict) -> object:
     if "index" not in texture:
         return None
     entry = document.item("textures", texture["index"])
@@ -56,7 +56,7 @@ def _image_index(document: Document, texture: dict) -> int | None:
     return entry.get("source", webp.get("source"))
 
 
-def _image(document: Document, index: int, warn: Warn) -> tuple[np.ndarray | None, str]:
+def _image(document: Document, index: object, warn: Warn) -> tuple[np.ndarray | None, str]:
     entry = document.item("images", index)
     name = str(entry.get("name", ""))
     try:

@@ -92,7 +92,7 @@ def _by_material(mesh: Mesh) -> list[tuple[int, np.ndarray]]:
 def _materials(materials: tuple[Material, ...], build: _Builder) -> dict:
     entries, images = [], []
     for material in materials:
-        color = np.clip(material.base_color, 0, 1).astype(float).tolist()
+        color = np.clip(np.nan_to_num(material.base_color), 0, 1).astype(float).tolist()
         shading = {"baseColorFactor": color, "metallicFactor": 0.0}
         if material.image is not None:
             shading["baseColorTexture"] = {"index": len(images)}

@@ -90,7 +90,8 @@ def write_mesh(path: str | os.PathLike, mesh: Mesh, *, force: bool = False) -> N
     Raises
     ------
     IoError
-        Unknown suffix, no faces, the file exists, its folder cannot be written, the disk is full.
+        Unknown suffix, no faces, attributes that do not match, a coordinate too large for float32
+        where the format wants it, the file exists, its folder cannot be written, the disk is full.
 
     Notes
     -----
@@ -102,8 +103,29 @@ def write_mesh(path: str | os.PathLike, mesh: Mesh, *, force: bool = False) -> N
     check_output(path, force)
     if mesh.n_faces == 0:
         raise IoError("the mesh has no faces", f"output {path}", "write a mesh with faces")
+    _check_attributes(mesh, f"output {path}")
     with atomic_write(path, force) as temporary:
         format.function(format.writer)(temporary, mesh)
+
+
+def _check_attributes(mesh: Mesh, where: str) -> None:
+    """What lies beside vertices and faces must match them, or the file would be corrupt."""
+    sizes = (("uv", mesh.n_vertices), ("vertex_colors", mesh.n_vertices))
+    for name, expected in (*sizes, ("material_index", mesh.n_faces)):
+        values = getattr(mesh, name)
+        if values is not None and len(values) != expected:
+            what = f"{name} has {len(values)} entries where {expected} are needed"
+            raise IoError(what, where, "give one for every vertex, or every face")
+    index, n_materials = mesh.material_index, len(mesh.materials)
+    if index is not None and n_materials and not _is_within(index, n_materials):
+        what = (
+            f"material_index runs from {index.min()} to {index.max()} for {n_materials} materials"
+        )
+        raise IoError(what, where, "use -1 for none and 0 to n - 1 for the others")
+
+
+def _is_within(index: np.ndarray, n_materials: int) -> bool:
+    return bool(((index >= -1) & (index < n_materials)).all())
 
 
 def _unreadable(path: Path, format: Format, reason: str) -> IoError:
@@ -121,5 +143,7 @@ def _reason(error: BaseException) -> str:
         return "it is nested too deeply"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
+    if isinstance(error, KeyError):
+        return f"{error} is missing, or says what is not known"
     words = " ".join(str(error).split())
     return words[:300] or type(error).__name__

@@ -249,7 +249,8 @@ def _check_half(volume: NarrowBand | Grid, where: str) -> None:
     finite = np.abs(volume.values[np.isfinite(volume.values)])
     largest = float(finite.max(initial=0.0))
     if largest > _LARGEST_HALF or 0 < largest < _SMALLEST_HALF:
-        what = f"values up to {largest:g} do not fit float16 ({_SMALLEST_HALF:.2g} to {_LARGEST_HALF:g})"
+        span = f"{_SMALLEST_HALF:.2g} to {_LARGEST_HALF:g}"
+        what = f"values up to {largest:g} do not fit float16 ({span})"
         raise IoError(what, where, "write without half, or scale the mesh")
 
 

@@ -71,7 +71,7 @@ def write_obj(path: Path, mesh: Mesh) -> None:
         table.append(srgb_rgba(mesh.vertex_colors)[:, :3])
         place = "v %r %r %r %r %r %r\n"
     corner = "%d" if mesh.uv is None else "%d/%d"
-    with open(path, "w", encoding="utf-8", newline="\n") as file:
+    with open(path, "w", encoding="utf-8", errors="replace", newline="\n") as file:
         file.write(_formatted(place, np.hstack(table)))
         if mesh.uv is not None:
             file.write(_formatted("vt %r %r\n", mesh.uv))
@@ -97,7 +97,9 @@ def _material_runs(mesh: Mesh):
     runs = []
     for first, last in pairwise([0, *cuts.tolist(), mesh.n_faces]):
         name = mesh.materials[index[first]].name if index[first] >= 0 else ""
-        runs.append((" ".join(name.split()) or "none", first, last))
+        # Faces have no material until the first usemtl; afterwards OBJ cannot take it back.
+        is_bare = index[first] < 0 and first == 0
+        runs.append((None if is_bare else " ".join(name.split()) or "none", first, last))
     return runs
 
 

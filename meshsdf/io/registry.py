@@ -95,6 +95,11 @@ def format_of(path: str | os.PathLike, kind: Kind | None = None, task: str = "re
     raise IoError(what, f"file {path}", f"use one of {', '.join(known)}{hint}")
 
 
+def kind_of(path: str | os.PathLike) -> Kind:
+    """Return what the suffix of ``path`` says it holds; IoError if the suffix is unknown."""
+    return format_of(path).kind
+
+
 def checked_input(path: str | os.PathLike) -> Path:
     """Return the path as a `Path`; IoError if there is no regular file to read."""
     path = Path(path)

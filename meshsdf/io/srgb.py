@@ -28,7 +28,7 @@ def linear_rgba(encoded: Float[np.ndarray, "n c"]) -> np.ndarray:
 
 
 def srgb_rgba(linear: Float[np.ndarray, "n 4"]) -> np.ndarray:
-    """(n, 4) linear -> (n, 4) float64 sRGB in [0, 1], clipped; alpha as it is."""
-    clipped = np.clip(linear.astype(np.float64), 0, 1)
+    """(n, 4) linear -> (n, 4) float64 sRGB in [0, 1], clipped, NaN to 0; alpha as it is."""
+    clipped = np.clip(np.nan_to_num(linear.astype(np.float64)), 0, 1)
     clipped[:, :3] = srgb_from_linear(clipped[:, :3])
     return clipped

@@ -174,7 +174,7 @@ def _weights(x, y, l, m, h, first):  # noqa: E741
     else:
         w = min(qy / h, 1.0)
         v = min(max((qx - w * m) / l, 0.0), 1.0 - w)
-    u = 1.0 - v - w
+    u = max(1.0 - v - w, 0.0)
     planar = (x - qx) * (x - qx) + (y - qy) * (y - qy)
     if first == 0:
         return u, v, w, planar

@@ -70,14 +70,22 @@ def trace_holes(points: Points, segments: Int32[np.ndarray, "s 2"]) -> tuple[Hol
     is_used = np.zeros(s, dtype=np.bool_)
     n_loops = trace_loops(local, start, incident, is_used, place, path, loop_vertices, loop_start)
     corners = points[vertices[loop_vertices[:s]]]
-    holes = [_hole(corners[loop_start[i] : loop_start[i + 1]]) for i in range(n_loops)]
-    return tuple(sorted(holes, key=lambda hole: -hole.length))
+    return _measured(corners, loop_start[: n_loops + 1].astype(np.intp))
 
 
-def _hole(corners: np.ndarray) -> Hole:
-    following = np.concatenate([corners[1:], corners[:1]])
-    lengths = np.sqrt(((following - corners) ** 2).sum(axis=1))
-    length = float(lengths.sum())
-    middles = 0.5 * corners + 0.5 * following
-    center = lengths @ middles / length if length > 0 else middles.mean(axis=0)
-    return Hole(corners, True, length, len(corners), center)
+def _measured(corners: np.ndarray, start: np.ndarray) -> tuple[Hole, ...]:
+    """Holes from the corners of all loops, one after the other, and where each loop starts."""
+    following = np.arange(1, len(corners) + 1)
+    following[start[1:] - 1] = start[:-1]
+    after = corners[following]
+    x, y, z = (after - corners).T
+    lengths = np.hypot(np.hypot(x, y), z)  # squares would underflow for the smallest of meshes
+    loop_lengths = np.add.reduceat(lengths, start[:-1])
+    weights = lengths / np.repeat(loop_lengths, np.diff(start))
+    middles = 0.5 * corners + 0.5 * after
+    centers = np.add.reduceat(weights[:, None] * middles, start[:-1])
+    return tuple(
+        Hole(corners[start[i] : start[i + 1]], True, length, int(start[i + 1] - start[i]), center)
+        for i in np.argsort(-loop_lengths, kind="stable").tolist()
+        for length, center in [(float(loop_lengths[i]), centers[i])]
+    )

@@ -1,15 +1,20 @@
 """A two-set report as sentences for people and as plain types for machines."""
 
+from math import isfinite
+
 import numpy as np
 
 from .two_set_report import TwoSetReport
 
 
 def report_to_json(report: TwoSetReport) -> dict:
-    """Every fact of a report as bool, int, float, str, list and dict; no NaN, no infinity."""
+    """Every fact of a report as bool, int, float, str, list and dict.
+
+    Lengths, areas and volumes beyond the range of floats become null.
+    """
     crossings = report.self_intersections
     plain = {
-        name: value
+        name: _finite(value) if isinstance(value, float) else value
         for name, value in vars(report).items()
         if isinstance(value, bool | int | float | str)
     }
@@ -18,7 +23,7 @@ def report_to_json(report: TwoSetReport) -> dict:
         "crack_width": report.crack_width,
         "holes": [
             {
-                "length": hole.length,
+                "length": _finite(hole.length),
                 "n_edges": hole.n_edges,
                 "closed": hole.closed,
                 "center": hole.center.tolist(),
@@ -28,8 +33,8 @@ def report_to_json(report: TwoSetReport) -> dict:
         "components": [
             {
                 "n_faces": part.n_faces,
-                "area": part.area,
-                "volume": part.volume,
+                "area": _finite(part.area),
+                "volume": _finite(part.volume),
                 "closed": part.closed,
                 "oriented": part.oriented,
                 "inside_out": part.inside_out,
@@ -99,17 +104,17 @@ def _open_words(report: TwoSetReport) -> list[str]:
     size += _place(longest.center)
     which = f"1 hole of {size}" if n == 1 else f"{n} holes, the largest of {size}"
     words = [f"not two-set: {which}."]
-    beyond = f"{report.certain_beyond:.2g} units"
-    words.append(
-        f"Inside is undefined at the {'hole' if n == 1 else 'holes'}; further than {beyond} from "
-        f"{'its rim' if n == 1 else 'their rims'} the sign is the same however "
-        f"{'it is' if n == 1 else 'they are'} filled (within the convex hull of "
-        f"{'the' if n == 1 else 'each'} rim)."
-    )
     if report.crack_width is not None:
         words.append(
             f"{'It is only a crack' if n == 1 else 'They are only cracks'}: moving vertices by "
             f"{report.crack_width:.2g} units closes the mesh."
+        )
+    else:
+        words.append(
+            f"Inside is undefined there; further than {report.certain_beyond:.2g} units from "
+            f"{'the rim' if n == 1 else 'the rims'} the sign is the same however "
+            f"{'it is' if n == 1 else 'they are'} filled (within the convex hull of "
+            f"{'the' if n == 1 else 'each'} rim)."
         )
     if report.n_tjunction_edges:
         words.append(
@@ -173,6 +178,10 @@ def _crossing_words(report: TwoSetReport) -> list[str]:
     n = _count(crossings.n_pairs, "pair")
     does = "crosses" if crossings.n_pairs == 1 else "cross"
     return [f"{n} of faces {does} (first near {_place(crossings.first_place)}): harmless here."]
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
 
 
 def _count(n: int, singular: str, plural: str | None = None) -> str:

@@ -6,7 +6,7 @@ from ..errors import ReportError
 from ..mesh import Mesh
 from ..mesh.measures import area, euler_number, is_watertight, n_components, volume
 from ..progress import Progress, silent
-from .enclosure import Enclosure
+from .enclosure import Enclosure, ceil_digits, floor_digits
 from .hausdorff import OneSided, hausdorff
 
 
@@ -93,17 +93,19 @@ class Comparison:
         if self.voxel_size is not None:
             units.append(("voxels", self.in_voxels))
         rows = [
-            ("largest, at least", self.distance.lower),
-            ("largest, at most", self.distance.upper),
-            ("A to B, mean", self.forward.mean),
-            ("A to B, rms", self.forward.rms),
-            ("A to B, at most", self.forward.distance.upper),
-            ("B to A, mean", self.backward.mean),
-            ("B to A, rms", self.backward.rms),
-            ("B to A, at most", self.backward.distance.upper),
+            ("largest, at least", self.distance.lower, floor_digits),
+            ("largest, at most", self.distance.upper, ceil_digits),
+            ("A to B, mean", self.forward.mean, _number),
+            ("A to B, rms", self.forward.rms, _number),
+            ("A to B, at most", self.forward.distance.upper, ceil_digits),
+            ("B to A, mean", self.backward.mean, _number),
+            ("B to A, rms", self.backward.rms, _number),
+            ("B to A, at most", self.backward.distance.upper, ceil_digits),
         ]
         lines = [_row("distance", *(name for name, _ in units))]
-        lines += [_row(name, *(_number(convert(x)) for _, convert in units)) for name, x in rows]
+        for name, length, write in rows:
+            cells = [convert(length) for _, convert in units]
+            lines.append(_row(name, *("-" if x is None else write(x) for x in cells)))
         worst = max(self.forward, self.backward, key=lambda side: side.distance.lower)
         place = ", ".join(f"{x:.6g}" for x in worst.witness)
         side = "A" if worst is self.forward else "B"
@@ -202,7 +204,7 @@ def _side(side: OneSided) -> dict:
     }
 
 
-def _number(value: float | bool | None) -> str:
+def _number(value: float | int | bool | None) -> str:
     if value is None:
         return "-"
     if isinstance(value, bool):

@@ -1,6 +1,7 @@
-"""A number known to lie between two others."""
+"""A number known to lie between two others, and what of it may be printed."""
 
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from math import isnan
 
 from ..errors import ReportError
@@ -36,7 +37,7 @@ class Enclosure:
 
     def contains(self, value: float) -> bool:
         """Tell whether ``lower <= value <= upper``."""
-        return self.lower <= value <= self.upper
+        return bool(self.lower <= value <= self.upper)
 
     def scaled(self, factor: float) -> "Enclosure":
         """Return the enclosure in another unit: both ends times a positive factor."""
@@ -45,3 +46,16 @@ class Enclosure:
     def largest(self, other: "Enclosure") -> "Enclosure":
         """Return the enclosure of the larger of the two numbers enclosed."""
         return Enclosure(max(self.lower, other.lower), max(self.upper, other.upper))
+
+    def __str__(self) -> str:
+        return f"[{floor_digits(self.lower)}, {ceil_digits(self.upper)}]"
+
+
+def floor_digits(value: float, digits: int = 6) -> str:
+    """Write with so many digits, rounded down: what is at least this stays at least this."""
+    return f"{Context(digits, ROUND_FLOOR).create_decimal(value):g}"
+
+
+def ceil_digits(value: float, digits: int = 6) -> str:
+    """Write with so many digits, rounded up: what is at most this stays at most this."""
+    return f"{Context(digits, ROUND_CEILING).create_decimal(value):g}"

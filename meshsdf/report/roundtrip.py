@@ -50,6 +50,11 @@ class RoundTripRow:
     warnings: tuple[str, ...]
     seconds: dict[str, float]
 
+    def is_within(self, limit: Number, in_voxels: bool = False) -> bool:
+        """Whether the error is certainly at most ``limit``, in world units or in voxels."""
+        scale = self.voxel_size if in_voxels else 1.0
+        return self.comparison.distance.upper <= limit * scale
+
     def to_json(self) -> dict:
         """Return plain types, as the command prints them."""
         head = {"resolution": self.resolution, "voxel_size": self.voxel_size, "sign": self.sign}

@@ -7,6 +7,7 @@ search) and `kernels.point_triangle` (one triangle, with its error bound).
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Int32
 
 from ..arrays import Barycentrics, Indices, Points, Values
 from ..box import Box
@@ -23,6 +24,8 @@ from ..kernels.parallel import even_ranges, run_pieces
 from ..kernels.point_triangle import FRAME_SIZE, build_frames
 from ..mesh import Mesh
 from ..progress import Progress, silent
+
+Seeds = Int32[np.ndarray, " seeds"]  # one per point, or none at all
 
 UNIT_ROUNDOFF = 2.0**-53
 ROUNDING = 64 * UNIT_ROUNDOFF  # times (|p - center| + radius of the mesh); see ClosestPoint
@@ -114,7 +117,7 @@ class ClosestPoint:
         self,
         points: Points,
         *,
-        seed_faces: Indices | None = None,
+        seed_faces: Seeds | None = None,
         progress: Progress = silent,
     ) -> ClosestPoints:
         """Find the closest point to each of (n, 3) points, world units.
@@ -155,7 +158,7 @@ class ClosestPoint:
         self,
         points: Points,
         *,
-        seed_faces: Indices | None = None,
+        seed_faces: Seeds | None = None,
         progress: Progress = silent,
     ) -> Distances:
         """Return distance and face only; otherwise as calling the object."""
@@ -172,7 +175,7 @@ class ClosestPoint:
         build_frames(self.corners, self.face_of_slot, begin, end, self.frames)
 
     def search(
-        self, centered: Points, seeds: Indices, progress: Progress = silent
+        self, centered: Points, seeds: Seeds, progress: Progress = silent
     ) -> tuple[Values, Indices]:
         """Squared distances and slots of (n, 3) points relative to ``center``, unchecked.
 
@@ -194,7 +197,7 @@ class ClosestPoint:
         run_pieces(work, len(pieces), stage="closest points", progress=progress)
         return squares, slots
 
-    def _seeds(self, n: int, seed_faces: Indices | None) -> Indices:
+    def _seeds(self, n: int, seed_faces: Seeds | None) -> Seeds:
         if seed_faces is None:
             return np.empty(0, np.int32)
         m = self.mesh.n_faces

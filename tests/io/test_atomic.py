@@ -7,7 +7,7 @@ import stat
 import pytest
 
 from meshsdf.errors import IoError
-from meshsdf.io.atomic import atomic_write, check_output
+from meshsdf.io.atomic import atomic_write, check_output, make_folder, write_text
 
 
 def names(folder):
@@ -115,6 +115,8 @@ def test_places_that_cannot_be_written_are_refused_before_any_work(tmp_path):
         check_output("/dev/null", force=True)
     with pytest.raises(IoError, match="cannot write"):
         check_output(tmp_path / ("a" * 300), force=True)
+    with pytest.raises(IoError, match="zero byte"):
+        check_output("a\0b", force=True)
 
 
 def test_a_folder_without_permission_is_refused_before_any_work(tmp_path, monkeypatch):
@@ -153,3 +155,32 @@ def test_a_symbolic_link_stays_a_link_to_the_new_content(tmp_path):
         temporary.write_bytes(b"new")
     assert (tmp_path / "link.bin").is_symlink()
     assert (tmp_path / "real.bin").read_bytes() == b"new"
+
+
+def test_text_is_written_whole_and_not_over_an_old_file(tmp_path):
+    write_text(tmp_path / "a.json", "größe\n")
+    assert (tmp_path / "a.json").read_bytes() == "größe\n".encode()
+    with pytest.raises(IoError, match="the output exists"):
+        write_text(tmp_path / "a.json", "")
+    write_text(tmp_path / "a.json", "new", force=True)
+    assert (tmp_path / "a.json").read_text() == "new"
+
+
+def test_a_folder_is_made_with_its_parents_or_the_obstacle_is_named(tmp_path, monkeypatch):
+    assert make_folder(tmp_path / "a" / "b") == tmp_path / "a" / "b"
+    assert make_folder(tmp_path / "a" / "b").is_dir()
+    (tmp_path / "file").write_bytes(b"")
+    for place in (tmp_path / "file", tmp_path / "file" / "c"):
+        with pytest.raises(IoError, match="a file stands where the folder should be"):
+            make_folder(place)
+    with pytest.raises(IoError, match="cannot be made: File name too long"):
+        make_folder(tmp_path / ("a" * 300))
+
+
+def test_a_suffix_that_does_not_suit_is_refused_before_any_work(tmp_path):
+    check_output(tmp_path / "a.npz", kind="volume")
+    check_output(tmp_path / "a.txt")
+    with pytest.raises(IoError, match=r"a volume with suffix '\.obj' cannot be written"):
+        check_output(tmp_path / "a.obj", kind="volume")
+    with pytest.raises(IoError, match=r"a mesh with suffix '\.gltf' cannot be written"):
+        check_output(tmp_path / "a.gltf", kind="mesh")

@@ -90,6 +90,15 @@ def test_strips_and_fans_keep_their_side(tmp_path, mode, expected):
     assert_array_equal(mesh.faces, expected)
 
 
+def test_parts_that_draw_on_the_same_arrays_keep_their_common_vertices(tmp_path):
+    parts = document(materials=[{"name": "a"}, {"name": "b"}])
+    first = {"attributes": {"POSITION": 0}, "indices": 1, "material": 0}
+    parts["meshes"] = [{"primitives": [first, first | {"mode": 5, "material": 1}]}]
+    mesh = read(tmp_path, parts)
+    assert mesh.n_vertices == 4
+    assert mesh.material_index.tolist() == [0] * 4 + [1] * (mesh.n_faces - 4)
+
+
 def test_lines_and_points_are_refused_alone_and_said_beside_faces(tmp_path):
     lines = {"attributes": {"POSITION": 0}, "mode": 1}
     with pytest.raises(IoError, match="1 sets of lines or points, but no faces"):
@@ -189,17 +198,26 @@ BAD = [
     (("scenes", 0, "nodes"), ["x"], r"nodes\['x'\]"),
     (("asset", "version"), "1.0", "version 1.0; only 2"),
     (("extensionsRequired",), ["KHR_draco_mesh_compression"], "KHR_draco_mesh_compression"),
-    (("meshes",), 7, "GLTF"),
+    (("meshes",), 7, "its meshes are not a list"),
+    (("nodes", 0), 7, r"its nodes\[0\] is not an object"),
+    (("buffers", 0, "uri"), 7, "refers to the file 7"),
+    (("buffers", 0, "byteLength"), None, "length of a buffer is None"),
+    (("bufferViews", 0, "byteLength"), "x", "length of buffer view 0 is 'x'"),
+    (("meshes", 0, "primitives", 0, "material"), 0, r"materials\[0\], but there are 0"),
+    (("meshes", 0, "primitives", 0, "attributes"), {}, "POSITION"),
 ]
 
 
 @pytest.mark.parametrize(("path", "value", "words"), BAD)
 def test_documents_that_lie_are_refused_without_taking_memory(tmp_path, path, value, words):
     tracemalloc.start()
-    with pytest.raises(IoError, match=rf"(?i)readable gltf file: .*{words.replace('GLTF', '')}"):
+    with pytest.raises(
+        IoError, match=rf"(?i)readable gltf file: .*{words.replace('GLTF', '')}"
+    ) as caught:
         read(tmp_path, changed(path, value))
     assert tracemalloc.get_traced_memory()[1] < 8e6
     tracemalloc.stop()
+    assert "Type-check" not in caught.value.what
 
 
 def test_nesting_without_end_is_refused(tmp_path):

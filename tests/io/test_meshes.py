@@ -1,5 +1,7 @@
 """meshsdf.io.meshes: what was written comes back, and bad files are refused in one sentence."""
 
+import copy
+import resource
 import struct
 import subprocess
 import sys
@@ -10,7 +12,9 @@ import trimesh
 from numpy.testing import assert_array_equal
 
 from meshsdf.errors import IoError
+from meshsdf.grid import Grid
 from meshsdf.io import read_mesh, write_mesh
+from meshsdf.io.npz import write_npz
 from meshsdf.mesh import Mesh
 from tests.io.examples import awkward_mesh, painted_tetrahedron, signed_volume, tetrahedron
 
@@ -137,6 +141,60 @@ def test_a_mesh_without_faces_is_not_written(tmp_path):
     with pytest.raises(IoError, match="the mesh has no faces"):
         write_mesh(tmp_path / "a.ply", empty)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [*SUFFIXES, ".npz"])
+def test_a_write_that_fails_half_way_leaves_the_old_file(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(b"old")
+    vertices = np.random.default_rng(9).normal(size=(3000, 3))
+    big = Mesh(vertices, np.arange(3000, dtype=np.int32).reshape(-1, 3))
+
+    def write(path):
+        if suffix == ".npz":
+            write_npz(path, Grid(np.ones((20, 20, 20)), 1.0, np.zeros(3)), force=True)
+        else:
+            write_mesh(path, big, force=True)
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        with pytest.raises(IoError, match=r"writing failed .*the old file, if any, is intact"):
+            write(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert path.read_bytes() == b"old"
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_attributes_that_do_not_match_are_refused_before_writing(tmp_path):
+    paint = painted_tetrahedron()
+    wrong = np.array([0, 1, 2, -1], np.int32)
+    mesh = Mesh(paint.vertices, paint.faces, material_index=wrong, materials=paint.materials)
+    for suffix in SUFFIXES:
+        with pytest.raises(IoError, match="material_index runs from -1 to 2 for 2 materials"):
+            write_mesh(tmp_path / f"a{suffix}", mesh)
+    with pytest.raises(IoError, match="uv has 3 entries where 4 are needed"):
+        write_mesh(tmp_path / "a.obj", replace_unchecked(paint, uv=paint.uv[:3]))
+    assert list(tmp_path.iterdir()) == []
+
+
+def replace_unchecked(mesh, **changes):
+    """A copy with other attributes, as a caller without type checks could make it."""
+    copied = copy.copy(mesh)
+    for name, value in changes.items():
+        object.__setattr__(copied, name, value)
+    return copied
+
+
+def test_faces_without_material_come_first_bare_and_later_as_none(tmp_path):
+    paint = painted_tetrahedron()
+    index = np.array([-1, 1, 1, -1], np.int32)
+    mesh = Mesh(paint.vertices, paint.faces, material_index=index, materials=paint.materials)
+    write_mesh(tmp_path / "a.obj", mesh)
+    back = read_mesh(tmp_path / "a.obj")
+    assert back.material_index.tolist() == [-1, 0, 0, 1]
+    assert [material.name for material in back.materials] == ["blue", "none"]
 
 
 # Refusals

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+import meshsdf.io
 from meshsdf.errors import IoError
 from meshsdf.grid import Grid
 from meshsdf.io import read_volume, write_volume
-from meshsdf.io.registry import FORMATS, format_of, suffixes
+from meshsdf.io.registry import FORMATS, format_of, kind_of, suffixes
 from meshsdf.io.volumes import probe_volume
 
 
@@ -26,6 +27,14 @@ def test_no_suffix_belongs_to_two_formats():
 def test_capitals_do_not_matter():
     assert format_of("A.STL").name == "STL"
     assert format_of("a.Npz", "volume").name == "NPZ volume"
+    assert (kind_of("a.PLY"), kind_of("a.npz")) == ("mesh", "volume")
+
+
+def test_every_public_name_exists():
+    for name in meshsdf.io.__all__:
+        assert callable(getattr(meshsdf.io, name))
+    with pytest.raises(AttributeError, match="no attribute 'read_minds'"):
+        _ = meshsdf.io.read_minds
 
 
 @pytest.mark.parametrize(

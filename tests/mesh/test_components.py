@@ -5,7 +5,7 @@ import pytest
 
 from meshsdf.mesh import check
 
-from .shapes import cube, flipped, joined, soup_of, with_t_junction, without_faces
+from .shapes import cube, flipped, joined, make, without_faces
 
 
 def test_measures_of_a_cube_far_from_the_origin():
@@ -39,16 +39,17 @@ def test_open_and_closed_parts_are_told_apart():
     assert not report.two_set
 
 
-def test_parts_that_meet_at_a_t_junction_only_are_one():
-    # Both edges of a wall are split, so no edge ties its faces to the rest except the other two
-    mesh = soup_of(cube())
-    for face in range(3):
-        a, b, _ = mesh.faces[face]
-        mesh = with_t_junction(mesh, face, 0.5 * (mesh.vertices[a] + mesh.vertices[b]))
-    report = check(mesh)
+def test_a_wall_tied_to_its_cube_by_t_junctions_only_is_the_same_part():
+    rim = [(0, 0), (0, 0.5), (0, 1), (0.5, 1), (1, 1), (1, 0.5), (1, 0), (0.5, 0)]
+    wall = make([(0, y, z) for y, z in [*rim, (0.5, 0.5)]], [(i, (i + 1) % 8, 8) for i in range(8)])
+    report = check(joined(without_faces(cube(), 0, 1), wall))
     assert report.two_set
-    assert report.n_components == 1
+    assert not report.two_set_by_welding
+    assert report.n_tjunction_edges == 12
+    assert [part.n_faces for part in report.components] == [18]
     assert report.components[0].closed
+    apart = check(joined(without_faces(cube(), 0, 1), make(wall.vertices - 1, wall.faces)))
+    assert [part.closed for part in apart.components] == [False, False]
 
 
 def test_vertices_where_sheets_touch_are_counted():
@@ -63,7 +64,7 @@ def test_vertices_where_sheets_touch_are_counted():
 def test_sheets_that_lie_double_are_not_strict():
     doubled = check(joined(cube(), cube((1, 0, 0))))
     assert not doubled.strict
-    assert doubled.n_duplicate_faces in (0, 2)  # two if the diagonals of the wall agree
+    assert doubled.n_duplicate_faces == doubled.n_opposed_duplicates == 2
     assert check(cube()).strict
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.testing import assert_array_equal
 
-from meshsdf.mesh import residual_edge_lines, weld
+from meshsdf.mesh import check, residual_edge_lines, weld
 
-from .shapes import cube, flipped, soup_of, with_t_junction, without_faces
+from .shapes import cube, flipped, make, soup_of, with_t_junction, without_faces
 
 
 def lines_of(mesh):
@@ -30,6 +30,18 @@ def test_a_t_junction_has_one_line_from_end_to_end_for_all_its_pieces():
     heights = sorted(tuple(sorted((p[2], q[2]))) for p, q in zip(*pieces, strict=True))
     assert heights == [(0, 0.5), (0, 1), (0.5, 0.75), (0.75, 1)]
     assert (edge_line == -1).sum() == edge_line.size - 4
+
+
+def test_pieces_of_any_ratio_are_one_line_though_their_directions_round():
+    rng = np.random.default_rng(12)
+    for _ in range(100):
+        direction = rng.uniform(-1, 1, 3)
+        scales = -(2.0 ** rng.choice(np.arange(-30, 31), 3, replace=False))
+        a, t, b = direction * np.sort(scales)[:, None]
+        whole = make([a, b, *rng.normal(size=(2, 3))], [(0, 1, 2), (1, 0, 3), (2, 1, 3), (0, 2, 3)])
+        mesh = with_t_junction(whole, 0, t)
+        assert len(lines_of(mesh)[3]) == 1
+        assert check(mesh).two_set
 
 
 def test_every_line_is_a_line_and_its_ends_are_outermost():

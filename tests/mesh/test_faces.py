@@ -42,6 +42,18 @@ def test_points_on_a_line_or_a_few_ulps_beside_it_are_told_apart(seed, exponent,
     assert found == exactly_collinear(p, p + d, r)
 
 
+def test_points_on_a_line_are_found_though_their_differences_round():
+    rng = np.random.default_rng(11)
+    for _ in range(200):
+        direction = rng.uniform(-1, 1, 3)
+        scales = 2.0 ** rng.choice(np.arange(-30, 31), 3, replace=False)
+        p, q, r = on_line = direction * scales[:, None]  # all on one line through the origin
+        assert exactly_collinear(p, q, r)
+        assert are_collinear(on_line, ONE)[0]
+        r[1] = np.nextafter(r[1], np.inf)
+        assert not are_collinear(on_line, ONE)[0]
+
+
 def test_only_faces_of_exactly_zero_area_are_degenerate():
     corners = np.array([[0.0, 0, 0], [1, 1, 1], [3, 3, 3], [3, 3, np.nextafter(3, 4)]])
     faces = np.array([(0, 1, 2), (0, 1, 3), (0, 0, 1), (2, 2, 2)], dtype=np.int32)

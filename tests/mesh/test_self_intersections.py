@@ -71,12 +71,23 @@ def test_overlapping_cubes_cross_even_where_edges_meet_diagonals():
         assert ((place >= np.array(offset) - 1e-15) & (place <= 1)).all()
 
 
+def test_an_edge_that_passes_the_rim_of_a_face_counts_and_one_that_ends_there_does_not():
+    face = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    passing = [(0.5, 0, -1), (0.5, 0, 1), (0.5, -5, 0.1)]
+    ending = [(0.5, 0, 0), (0, -1, 1), (1, -1, 1)]
+    for other, count in ((passing, 1), (ending, 0)):
+        for turned in ((0, 1, 2), (2, 1, 0)):
+            mesh = make([*face, *other], [turned, (3, 4, 5)])
+            assert check(mesh).n_self_intersections == count
+
+
 def test_faces_that_share_a_corner_count_only_if_they_meet_elsewhere():
-    apex, base = (0.0, 0, 0), [(1.0, -1, 0), (1.0, 1, 0)]
-    through = [(2.0, 0, -1), (0.5, 0, 1)]  # passes the base triangle
+    corner, base = (0.0, 0, 0), [(1.0, -1, 0), (1.0, 1, 0)]
+    through_the_base = [(0.8, 0.1, -1), (0.6, 0, 1)]
+    over_the_base = [(2.0, 0, -1), (0.5, 0, 1)]  # the base's far edge passes this one
     beside = [(2.0, 5, -1), (0.5, 5, 1)]
-    for other, count in ((through, 0), (beside, 0), ([(0.8, 0.1, -1), (0.6, 0, 1)], 1)):
-        mesh = make([apex, *base, *other], [(0, 1, 2), (0, 3, 4)])
+    for other, count in ((through_the_base, 1), (over_the_base, 1), (beside, 0)):
+        mesh = make([corner, *base, *other], [(0, 1, 2), (0, 3, 4)])
         assert check(mesh).n_self_intersections == count, other
 
 

@@ -35,7 +35,7 @@ SENTENCES = [
         without_faces(cube(), 0, 1),
         "not two-set: 1 hole of 4 edges, 4 units long, near (0, 0.5, 0.5)",
     ),
-    (without_faces(cube(), 0, 1), "further than 0.64 units from its rim"),  # 4 / 2π
+    (without_faces(cube(), 0, 1), "further than 0.64 units from the rim"),  # 4 / 2π
     (without_faces(cube(), 0, 6), "not two-set: 2 holes, the largest of 3 edges, 3.41 units long"),
     (klein_bottle(), "convert will count crossings (parity)"),
     (flipped(cube(), 0), "not oriented: faces disagree about their front at 3 edges."),

@@ -1,0 +1,5 @@
+"""``python -m meshsdf`` is the command ``meshsdf``."""
+
+from .cli.main import main
+
+main()

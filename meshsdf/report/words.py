@@ -1,0 +1,52 @@
+"""A round trip as a table for people."""
+
+from .roundtrip import RoundTrip, RoundTripRow
+
+HEADS = (
+    "resolution",
+    "voxel",
+    "largest (world)",
+    "in voxels",
+    "% diagonal",
+    "mean vox",
+    "rms vox",
+    "volume",
+    "Euler",
+    "parts",
+    "seconds",
+)
+WIDTHS = (10, 11, 25, 15, 17, 9, 9, 9, 9, 7, 8)
+
+
+def roundtrip_table(trip: RoundTrip) -> str:
+    """Return one line per resolution, and the order of the error if there are several."""
+    lines = ["".join(f"{head:>{width}}" for head, width in zip(HEADS, WIDTHS, strict=True))]
+    lines += [
+        "".join(f"{cell:>{width}}" for cell, width in zip(_cells(row), WIDTHS, strict=True))
+        for row in trip.rows
+    ]
+    if trip.order is not None:
+        lines.append(f"observed order of the largest distance: {trip.order:.2f}")
+    return "\n".join(lines)
+
+
+def _cells(row: RoundTripRow) -> tuple[str, ...]:
+    found = row.comparison
+    lower, upper = found.distance.lower, found.distance.upper
+    before, after = found.before, found.after
+    volume = "-"
+    if before.volume and after.volume is not None:
+        volume = f"{100 * (after.volume / before.volume - 1):+.2f}%"
+    return (
+        f"{row.resolution:g}",
+        f"{row.voxel_size:.4g}",
+        f"[{lower:.5g}, {upper:.5g}]",
+        f"[{found.in_voxels(lower):.3f}, {found.in_voxels(upper):.3f}]",
+        f"[{found.in_percent(lower):.4f}, {found.in_percent(upper):.4f}]",
+        f"{found.in_voxels(found.forward.mean):.4f}",
+        f"{found.in_voxels(found.forward.rms):.4f}",
+        volume,
+        f"{before.euler_number}>{after.euler_number}",
+        f"{before.n_components}>{after.n_components}",
+        f"{sum(row.seconds.values()):.2f}",
+    )

@@ -1,0 +1,85 @@
+"""meshsdf.report.compare: two meshes side by side, for programs and for people."""
+
+import json
+
+import numpy as np
+import pytest
+
+from meshsdf.errors import ReportError
+from meshsdf.mesh import Mesh
+from meshsdf.mesh.primitives import box_mesh, icosphere
+from meshsdf.report.compare import compare
+from meshsdf.report.hausdorff import hausdorff
+
+SMALL, LARGE = box_mesh((1, 1, 1)), box_mesh((1.2, 1.2, 1.2))
+EMPTY = Mesh(np.zeros((3, 3)), np.empty((0, 3), np.int32))
+
+
+def test_two_boxes_differ_by_their_corners_and_their_measures():
+    found = compare(SMALL, LARGE, voxel_size=0.05)
+    corner = 0.1 * np.sqrt(3)
+    assert found.distance.contains(corner)
+    assert found.forward.distance.contains(0.1)
+    assert found.in_voxels(0.1) == pytest.approx(2)
+    assert found.in_percent(0.1) == pytest.approx(10 / np.sqrt(3))
+    assert (found.before.volume, found.after.volume) == pytest.approx((1, 1.728))
+    assert (found.before.area, found.after.area) == pytest.approx((6, 6 * 1.44))
+    assert found.before.euler_number == found.after.euler_number == 2
+    assert found.before.n_components == 1
+    assert found.before.is_watertight
+
+
+def test_an_open_mesh_has_no_volume():
+    sphere = icosphere(subdivisions=1)
+    found = compare(sphere, Mesh(sphere.vertices, sphere.faces[1:]))
+    assert found.before.volume is not None
+    assert found.after.volume is None
+    assert not found.after.is_watertight
+    assert json.loads(json.dumps(found.to_json()))["measures"]["b"]["volume"] is None
+
+
+def test_json_holds_plain_numbers_and_the_same_ones():
+    found = compare(SMALL, LARGE, voxel_size=0.05)
+    told = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    assert told["hausdorff"] == {"lower": found.distance.lower, "upper": found.distance.upper}
+    assert told["forward"]["mean"] == found.forward.mean
+    assert told["forward"]["witness"] == found.forward.witness.tolist()
+    assert told["backward"]["rms"] == found.backward.rms
+    assert told["hausdorff_voxels"]["upper"] == pytest.approx(20 * found.distance.upper)
+    assert told["measures"]["a"]["n_faces"] == 12
+    without = compare(SMALL, LARGE).to_json()
+    assert "voxel_size" not in without
+    assert "hausdorff_voxels" not in without
+
+
+def test_the_table_names_every_row_in_every_unit():
+    table = compare(SMALL, LARGE, voxel_size=0.05).describe()
+    for word in ("world units", "% of diagonal", "voxels", "at most", "mean", "rms", "Euler"):
+        assert word in table
+    assert "3.4641" in table  # 0.1 sqrt(3) in voxels of 0.05
+    assert "voxels" not in compare(SMALL, LARGE).describe()
+    assert "met its limit" not in table
+
+
+def test_it_is_the_hausdorff_distance_with_the_same_tolerance():
+    found = compare(SMALL, LARGE, tolerance=1e-3)
+    assert found.distance == hausdorff(SMALL, LARGE, tolerance=1e-3).distance
+
+
+def test_one_point_has_no_percentages():
+    point = Mesh(np.zeros((1, 3)), np.zeros((1, 3), np.int32))
+    found = compare(point, SMALL)
+    assert found.in_percent(1.0) is None
+    assert found.to_json()["hausdorff_percent_of_diagonal"] is None
+    assert "-" in found.describe()
+
+
+@pytest.mark.parametrize(("a", "b", "name"), [(EMPTY, SMALL, "A"), (SMALL, EMPTY, "B")])
+def test_a_mesh_without_faces_is_refused(a, b, name):
+    with pytest.raises(ReportError, match=f"mesh {name} has no faces, so nothing can be close"):
+        compare(a, b)
+
+
+def test_a_voxel_size_of_zero_is_refused():
+    with pytest.raises(ReportError, match="the voxel size is 0"):
+        compare(SMALL, LARGE, voxel_size=0.0)
