@@ -21,8 +21,15 @@ def command(folder: str, force: bool, as_json: bool) -> int:
     """
     console = Console("demo", as_json=as_json)
     console.watch_compilation()
-    from ..io import check_output, make_folder, write_mesh, write_text, write_volume
-    from ..mesh.primitives import trefoil_tube
+    from ..io import (
+        atomic_write,
+        check_output,
+        make_folder,
+        write_mesh,
+        write_text,
+        write_volume,
+    )
+    from ..mesh.tubes import trefoil_tube
     from ..mesh.two_set import check
     from ..report.figures import draw_errors, draw_surfaces
     from ..report.roundtrip import roundtrip
@@ -35,14 +42,12 @@ def command(folder: str, force: bool, as_json: bool) -> int:
     for name in names:
         check_output(out / name, force=force)
 
-    knot = trefoil_tube()
+    knot = trefoil_tube(n_along=480, n_around=48)
     write_mesh(out / "trefoil.ply", knot, force=force)
     report = check(knot, progress=console.progress)
     console.result(f"trefoil.ply: {report.describe()}")
     write_text(out / "check.json", json.dumps(report.to_json(), indent=2), force=force)
-    band = mesh_to_band(
-        knot, resolution=RESOLUTIONS[-1], report=report, progress=console.progress
-    )
+    band = mesh_to_band(knot, resolution=RESOLUTIONS[-1], report=report, progress=console.progress)
     write_volume(out / "trefoil.npz", band, force=force)
     trip = roundtrip(knot, RESOLUTIONS, report=report, progress=console.progress)
     console.result(roundtrip_table(trip))
@@ -52,12 +57,13 @@ def command(folder: str, force: bool, as_json: bool) -> int:
     for row in trip.rows:
         write_mesh(out / f"trefoil_{row.resolution:g}.ply", row.surface, force=force)
     with console.stage("pictures"):
-        draw_errors(trip, out / "errors.png", title="Trefoil knot, mesh to volume to mesh")
+        with atomic_write(out / "errors.png", force) as file:
+            draw_errors(trip, file, title="Trefoil knot, mesh to volume to mesh")
         coarse = trip.rows[0]
         pair = [("mesh", knot), (f"after {coarse.resolution:g} voxels", coarse.surface)]
-        draw_surfaces(pair, out / "surfaces.png")
+        with atomic_write(out / "surfaces.png", force) as file:
+            draw_surfaces(pair, file)
     console.close()
     console.result(f"{out}: {', '.join(names)}")
     console.json({"output": str(out), "files": names} | facts | {"seconds": console.timings()})
     return YES
-

@@ -58,7 +58,8 @@ def command(
     closed = "closed" if facts["is_watertight"] else "open at the grid's border"
     seconds = console.timings("load", "surface", "write")
     console.result(
-        f"{out}: {plural(surface.n_vertices, 'vertex', 'vertices')}, {plural(surface.n_faces, 'face')}, {closed}, "
+        f"{out}: {plural(surface.n_vertices, 'vertex', 'vertices')}, "
+        f"{plural(surface.n_faces, 'face')}, {closed}, "
         f"Euler number {facts['euler_number']}, {seconds['total']:.2f} s"
     )
     head = {"input": volume, "output": out, "method": method, "level": level}

@@ -13,11 +13,12 @@ of d(p), cheapest first; each stands alone, and the least one is kept:
    one convex face each, linearly on triangles, and |p - map(p)| is convex on each: the largest
    displacement of a corner or a cut bounds d on T. The cuts are placed where side and e are
    nearest.
-4. A fan: the closest faces of the corners share a vertex w of the mesh. Cut T into three from the
-   point y of T nearest to w, and map y to w. Each part has a side of T between two faces of the
-   fan: cut it at every edge passed on the way around w, and map the cuts to those edges as in 3.
+4. A strip: the closest faces of the corners share a vertex w of the mesh. Cut T along the edges
+   passed on the way around w from one corner's face to the next, mapping the cuts as in 3.
+5. A fan: as 4, but the three sides of T lead once around w: the point y of T nearest to w is
+   mapped to w, and T is cut into three from there.
 
-Bounds 2 to 4 see that a flat piece over several coplanar faces has distance zero, which no
+Bounds 2 to 5 see that a flat piece over several coplanar faces has distance zero, which no
 sampling and no Lipschitz argument can.
 
 References: D. Zheng et al. 2022, doi:10.1111/cgf.14612 (bound 2); L. Sacht, A. Jacobson 2024,
@@ -30,7 +31,8 @@ from numba import njit
 from .point_triangle import closest_on_triangle, squared_distance
 
 TINY = 1e-300  # keeps a zero length out of a denominator; its numerator is zero too
-MAX_FAN = 16  # faces passed around a vertex, each way; more are left to cutting
+MAX_FAN = 16  # faces around a vertex, each way; what lies beyond is left to cutting
+FACE, EDGE_FACE, EDGE_END = 0, 1, 2  # rows of a ring
 
 
 @njit(cache=True, nogil=True)
@@ -40,9 +42,10 @@ def upper_bounds(
     """``upper[n]`` >= max of d over the piece with points ``pieces[n]`` (4,), begin <= n < end.
 
     Cheaper bounds alone decide where they fall to ``enough``. ``around`` (m, 6) holds for every
-    face its vertices and its neighbours over the edges after them, or is empty: no bound 4.
+    face its vertices and its neighbours over the edges after them, or is empty: no bounds 4, 5.
     """
     candidates = np.empty(4, np.int32)
+    ring = np.empty((3, 2 * MAX_FAN), np.int32)
     near = np.empty((4, 3))  # squared distance of each candidate face to each corner
     for n in range(begin, end):
         piece = pieces[n]
@@ -63,7 +66,7 @@ def upper_bounds(
                         found = _two_faces(points, piece, near[c], near[e], f, g, least)
                         least = min(least, found)
             if least > enough * enough and len(around) > 0:
-                least = _fan(points, squares, slots, piece, corners, order, around, least)
+                least = _fan(points, squares, slots, piece, corners, order, around, ring, least)
             bound = np.sqrt(least)
         upper[n] = bound
 
@@ -132,55 +135,95 @@ def _two_faces(points, piece, near_f, near_g, f, g, least):
 
 
 @njit(cache=True, nogil=True)
-def _fan(points, squares, slots, piece, corners, order, around, least):
-    """Bound 4, squared, or ``least`` if that is less or no vertex is common to the faces."""
-    f = order[slots[piece[0]]]
+def _fan(points, squares, slots, piece, corners, order, around, ring, least):
+    """Bounds 4 and 5, squared, or ``least`` if it is less or the faces have no common vertex."""
+    f, g, h = order[slots[piece[0]]], order[slots[piece[1]]], order[slots[piece[2]]]
+    a, b, c = points[piece[0]], points[piece[1]], points[piece[2]]
+    feet = max(squares[piece[0]], squares[piece[1]], squares[piece[2]])
     for k in range(3):
         w = around[f, k]
-        if _place(around, order[slots[piece[1]]], w) < 0:
+        if feet >= least or _place(around, g, w) < 0 or _place(around, h, w) < 0:
             continue
-        if _place(around, order[slots[piece[2]]], w) < 0:
+        # Places on the ring around w, face f at 0; on a closed ring also a period further
+        n_before, n_after, period = _list_ring(around, f, w, ring)
+        at_g = at_h = MAX_FAN
+        for place in range(-n_before, n_after):
+            at_g = place if ring[FACE, MAX_FAN + place] == g else at_g
+            at_h = place if ring[FACE, MAX_FAN + place] == h else at_h
+        if at_g == MAX_FAN or at_h == MAX_FAN:
             continue
-        p, a, b, c = corners[f, k], points[piece[0]], points[piece[1]], points[piece[2]]
-        largest = closest_on_triangle(p[0], p[1], p[2], a, b, c)[0]
-        for i in range(3):
-            largest = max(largest, squares[piece[i]])
-        for i in range(3):
-            j = (i + 1) % 3
-            first, last = order[slots[piece[i]]], order[slots[piece[j]]]
-            if first != last and largest < least:
-                one = _walk(points[piece[i]], points[piece[j]], first, last, w, 1, corners, around)
-                two = _walk(points[piece[i]], points[piece[j]], first, last, w, 2, corners, around)
-                largest = max(largest, min(one, two))
-        least = min(least, largest)
+        # Strip: one of the three gaps of a closed ring is left out
+        for turn in range(4 if period > 0 else 1):
+            p, q = at_g - period * (turn & 1), at_h - period * (turn >> 1)
+            if period > 0 and max(0, p, q) - min(0, p, q) >= period:
+                continue
+            found = max(feet, _cuts(a, b, 0, p, ring, period, w, corners, around))
+            found = max(found, _cuts(b, c, p, q, ring, period, w, corners, around))
+            found = max(found, _cuts(a, c, 0, q, ring, period, w, corners, around))
+            least = min(least, found)
+        # Fan: once around w
+        if period > 0:
+            p, q, end = at_g, at_h, period
+            if at_g > at_h:
+                p, q, end = at_g - period, at_h - period, -period
+            found = max(feet, _cuts(a, b, 0, p, ring, period, w, corners, around))
+            found = max(found, _cuts(b, c, p, q, ring, period, w, corners, around))
+            found = max(found, _cuts(c, a, q, end, ring, period, w, corners, around))
+            v = corners[f, k]
+            found = max(found, closest_on_triangle(v[0], v[1], v[2], a, b, c)[0])
+            least = min(least, found)
     return least
 
 
 @njit(cache=True, nogil=True)
-def _walk(p, q, first, last, w, turn, corners, around):
-    """Cut pq at every edge between the faces first .. last around w; largest squared distance.
+def _list_ring(around, start, w, ring):
+    """List the faces around w, ``start`` at MAX_FAN; (n before it, n from it on, n if closed or 0).
 
-    The walk leaves the first face over the edge from w to the corner ``turn`` after it. Infinite
-    if it meets a border, or does not arrive within ``MAX_FAN`` faces.
+    ``ring[:, i]`` = face i, and the edge from w that it shares with face i + 1: as a face, and the
+    corner of it at the edge's far end.
     """
-    largest, share, face, came_from = 0.0, 0.0, first, np.int32(-1)
-    for _ in range(MAX_FAN):
+    n_before, n_after = 0, 1
+    ring[FACE, MAX_FAN] = start
+    for turn in range(1, 3):
+        face, came_from = start, np.int32(-1)
+        for i in range(1, MAX_FAN):
+            k = _place(around, face, w)
+            far = (k + turn) % 3
+            if around[face, far] == came_from:
+                far = 3 - k - far
+            came_from = around[face, far]
+            # The edge from corner k to the next is number k, from the one before number far
+            other = around[face, 3 + (k if far == (k + 1) % 3 else far)]
+            at = MAX_FAN + i - 1 if turn == 1 else MAX_FAN - i
+            ring[EDGE_FACE, at], ring[EDGE_END, at] = face, far
+            if turn == 1 and other == start:
+                return 0, n_after, n_after
+            if other < 0 or _place(around, other, w) < 0:
+                break
+            face = other
+            if turn == 1:
+                ring[FACE, MAX_FAN + i] = face
+                n_after += 1
+            else:
+                ring[FACE, MAX_FAN - i] = face
+                n_before += 1
+    return n_before, n_after, 0
+
+
+@njit(cache=True, nogil=True)
+def _cuts(p, q, first, last, ring, period, w, corners, around):
+    """Cut pq at every edge between two places of the ring; largest squared distance to the edge."""
+    largest, share = 0.0, 0.0
+    step = 1 if last > first else -1
+    while first != last:
+        at = first if step > 0 else first - 1
+        at = MAX_FAN + (at % period if period > 0 else at)
+        face, far = ring[EDGE_FACE, at], ring[EDGE_END, at]
         k = _place(around, face, w)
-        if k < 0:
-            return np.inf
-        other = (k + turn) % 3
-        if around[face, other] == came_from:
-            other = 3 - k - other
-        came_from = around[face, other]
-        square, share = _segments2(p, q, corners[face, k], corners[face, other], share)
+        square, share = _segments2(p, q, corners[face, k], corners[face, far], share)
         largest = max(largest, square)
-        # The edge from k to the next corner is number k, from k to the one before number other
-        face = around[face, 3 + (k if other == (k + 1) % 3 else other)]
-        if face == last:
-            return largest
-        if face < 0:
-            return np.inf
-    return np.inf
+        first += step
+    return largest
 
 
 @njit(cache=True, nogil=True)

@@ -82,9 +82,9 @@ class ResidualLines:
         closed[self.junction_line[self.odd_junctions()]] = False
         return closed
 
-    def n_open_edges(self) -> int:
-        """Count the odd edges on lines where something survives."""
-        return int((self.is_odd & ~self.is_closed_line()[self.line]).sum())
+    def open_edges(self) -> Int32[np.ndarray, "k 2"]:
+        """List the ends of the odd edges on lines where something survives."""
+        return self.ends[self.is_odd & ~self.is_closed_line()[self.line]]
 
     def survivors(self, points: Points) -> Int32[np.ndarray, "s 2"]:
         """Pair the odd junctions along each line: the intervals covered an odd number of times."""

@@ -73,8 +73,9 @@ def check(
     segments = np.empty((0, 2), dtype=np.int32) if lines is None else lines.survivors(points)
     holes = trace_holes(points, segments)
     n_odd = int((table.n_uses % 2).sum())
-    n_open = 0 if lines is None else lines.n_open_edges()
-    repair = close_cracks(points, faces, segments) if len(segments) else None
+    open_edges = segments if lines is None else lines.open_edges()
+    n_open = len(open_edges)
+    repair = close_cracks(points, faces, open_edges) if n_open else None
     progress("edges", 1.0)
     facts = {
         "two_set": len(segments) == 0,

@@ -47,10 +47,10 @@ def draw_errors(trip: RoundTrip, path: Path, *, title: str) -> None:
 
 def draw_surfaces(meshes: list[tuple[str, Mesh]], path: Path) -> None:
     """Write a PNG of meshes side by side, shaded by one light, at one scale."""
-    figure = Figure(figsize=(5.2 * len(meshes), 5.2), layout="constrained")
+    figure = Figure(figsize=(5.2 * len(meshes), 4.6), layout="constrained")
     FigureCanvasAgg(figure)
     box = meshes[0][1].box
-    half = 0.36 * box.longest_side
+    half = 0.5 * box.longest_side
     for column, (title, mesh) in enumerate(meshes):
         axes = figure.add_subplot(1, len(meshes), column + 1, projection="3d")
         shade = 0.35 + 0.65 * np.clip(face_normals(mesh) @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1)
@@ -58,7 +58,7 @@ def draw_surfaces(meshes: list[tuple[str, Mesh]], path: Path) -> None:
         _add_triangles(axes, mesh.triangles, colors)
         for axis, center in zip("xyz", box.center, strict=True):
             getattr(axes, f"set_{axis}lim")(center - half, center + half)
-        axes.set_box_aspect((1, 1, 1), zoom=1.2)
+        axes.set_box_aspect((1, 1, 1), zoom=1.45)
         axes.view_init(elev=38, azim=-60)
         axes.set_axis_off()
         axes.set_title(title, color=INK, fontsize=11)

@@ -149,6 +149,7 @@ def test_one_vertex_moved_by_one_ulp_in_a_soup_opens_a_crack():
     report = check(make(vertices, np.arange(36)))
     assert not report.two_set
     assert report.n_open_edges == 4
+    assert report.crack_width == pytest.approx(np.spacing(0.1))
 
 
 def test_a_long_edge_may_meet_several_short_ones_and_gaps_are_found_on_the_line():
