@@ -55,7 +55,26 @@ _HOME = {
     "write_volume": "io",
 }
 
-__all__ = list(_HOME)
+__all__ = [
+    "Comparison",
+    "Enclosure",
+    "Grid",
+    "Mesh",
+    "MeshsdfError",
+    "NarrowBand",
+    "RoundTrip",
+    "TwoSetReport",
+    "check",
+    "compare",
+    "marching_cubes",
+    "mesh_to_band",
+    "mesh_to_grid",
+    "read_mesh",
+    "read_volume",
+    "roundtrip",
+    "write_mesh",
+    "write_volume",
+]
 
 
 def __getattr__(name: str):

@@ -57,7 +57,7 @@ def command(
     console.watch_compilation()
     from ..io import check_output, read_mesh, write_volume
     from ..mesh.two_set import check
-    from ..sdf import choose_sign, mesh_to_band, mesh_to_grid
+    from ..sdf import choose_sign, mesh_to_band, mesh_to_grid, resolve_voxel_size
 
     check_output(out, kind="volume", force=force)
     warnings: list[str] = []
@@ -65,7 +65,8 @@ def command(
         loaded = read_mesh(mesh, warn=warnings.append)
     with console.stage("check"):
         report = check(loaded, self_intersections=False)
-        choice = choose_sign(report, sign)
+        size = resolve_voxel_size(loaded, resolution, voxel_size)
+        choice = choose_sign(report, sign, voxel_size=size)
     options = {
         "resolution": resolution,
         "voxel_size": voxel_size,
@@ -83,7 +84,9 @@ def command(
         write_volume(out, volume, half=half, force=force)
     console.close()
 
-    warnings = [*warnings, *choice.warnings]
+    warnings += choice.warnings
+    if volume.sign != choice.method:
+        warnings.append("no node is inside, so distances are unsigned")
     for warning in warnings:
         console.say(f"warning: {warning}")
     facts = volume.facts()
@@ -93,7 +96,7 @@ def command(
     console.json(
         {"input": mesh, "output": out, "bytes": os.path.getsize(out)}
         | facts
-        | {"sign": choice.method, "sign_reason": choice.reason}
+        | {"sign": volume.sign, "sign_reason": choice.reason}
         | {"seconds": seconds, "warnings": warnings}
     )
     return YES
@@ -105,7 +108,7 @@ def _words(mesh: str, out: str, facts: dict, choice, loaded, total: float) -> st
     return (
         f"{mesh}: {plural(loaded.n_vertices, 'vertex', 'vertices')}, "
         f"{plural(loaded.n_faces, 'face')}\n"
-        f"sign: {choice.method} ({choice.reason})\n"
+        f"sign: {facts['sign']} ({choice.reason})\n"
         f"{out}: {shape} nodes of {facts['voxel_size']:.6g}, {kind}, "
         f"{plural(facts['active_voxels'], 'active voxel')}, "
         f"{file_size(os.path.getsize(out))}, {total:.2f} s"

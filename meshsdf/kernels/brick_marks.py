@@ -71,8 +71,8 @@ def mark_cells(points, faces, ids, reach, shift, cell0, cell1, root, pages):
         if flat:
             nx, ny, nz = nx / area, ny / area, nz / area
         grown = reach + half + 1e-6
-        x0 = max(cell0, np.int64(np.floor((min(a[0], b[0], c[0]) - reach)) - side + 1) // side)
-        x1 = min(cell1 - 1, np.int64(np.floor((max(a[0], b[0], c[0]) + reach))) // side)
+        x0 = max(cell0, np.int64(np.floor(min(a[0], b[0], c[0]) - reach) - side + 1) // side)
+        x1 = min(cell1 - 1, np.int64(np.floor(max(a[0], b[0], c[0]) + reach)) // side)
         z_min, z_max = min(a[2], b[2], c[2]) - grown, max(a[2], b[2], c[2]) + grown
         # Centre (cx, cy, cz) of a cell may lie this far from the plane of the face
         thick = reach + half * (abs(nx) + abs(ny) + abs(nz)) + 1e-6

@@ -2,8 +2,8 @@
 
 Files written by CAD programs often repeat a corner with slightly different numbers. Exactly read,
 such a mesh is open: the crack is real, only its width is not worth a sign. Here the vertices of
-open edges are welded within a distance that gives each of them a partner, as long as that is less than
-half of every open edge, or within rounding, so that cracks are zipped but no hole is collapsed.
+open edges are welded within a distance that gives each of them a partner, as long as that is less
+than half of every open edge, or within rounding: cracks are zipped, but no hole is collapsed.
 
 If two repairs that move no vertex by more than w both close a mesh, they agree on inside and
 outside at every point further than w from it, given that the w-neighbourhood of its open edges
@@ -93,4 +93,3 @@ def _weld_pairs(pairs: np.ndarray, rim: np.ndarray, n_points: int) -> np.ndarray
     labels = np.arange(n_points, dtype=np.int32)
     labels[rim] = lowest[cluster]
     return labels
-

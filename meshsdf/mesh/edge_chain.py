@@ -172,7 +172,7 @@ def _squared_cosine(heads: np.ndarray, tails: np.ndarray) -> np.ndarray:
 
 
 def residual_edge_lines(
-    faces: Faces, points: Points
+    faces: Faces, points: Points, *, table: EdgeTable | None = None
 ) -> tuple[Int32[np.ndarray, "l 3"], Int32[np.ndarray, "g 2"]]:
     """Name the supporting line of every edge that does not cancel by index.
 
@@ -196,7 +196,8 @@ def residual_edge_lines(
     Edges of one line that meet at a vertex get one number, so arithmetic done with ``line_ends``
     rounds alike for the long edge and for the short ones of a T-junction.
     """
-    table = edge_table(faces, len(points))
+    if table is None:
+        table = edge_table(faces, len(points))
     if table.is_balanced:
         return np.empty((0, 3), dtype=np.int32), np.empty((0, 2), dtype=np.int32)
     lines = residual_lines(table, points)

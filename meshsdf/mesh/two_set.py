@@ -23,7 +23,7 @@ from ..errors import MeshError
 from ..kernels.edges import mark_branching_vertices
 from ..progress import Progress, silent
 from .components import describe_components
-from .crack_repair import close_cracks
+from .crack_repair import CrackRepair, close_cracks
 from .edge_chain import residual_lines
 from .edge_table import EdgeTable, edge_table
 from .faces import degenerate_faces, face_sheets
@@ -83,7 +83,7 @@ def check(
         "open_edge_share": n_open / max(1, len(table.edges)),
         "n_orientation_conflicts": int(((table.n_uses % 2 == 0) & (table.net_uses != 0)).sum()),
     }
-    sign, reason = _recommend(**facts)
+    sign, reason = _recommend(**facts, repair=repair)
     components = describe_components(points, faces, table, lines)
     crossings = None
     if self_intersections:
@@ -101,7 +101,7 @@ def check(
         n_tjunction_edges=n_odd - n_open,
         holes=holes,
         certain_beyond=max((hole.reach for hole in holes), default=0.0),
-        crack_width=None if repair is None else repair.width,
+        repair=repair,
         components=components,
         self_intersections=crossings,
         recommended_sign=sign,
@@ -130,7 +130,12 @@ def _face_facts(points: np.ndarray, faces: np.ndarray, table: EdgeTable) -> dict
 
 
 def _recommend(
-    *, two_set: bool, oriented: bool, open_edge_share: float, n_orientation_conflicts: int
+    *,
+    two_set: bool,
+    oriented: bool,
+    open_edge_share: float,
+    n_orientation_conflicts: int,
+    repair: CrackRepair | None,
 ) -> tuple[Sign, str]:
     """Choose the sign method that the facts allow, and say why."""
     if oriented:
@@ -139,6 +144,11 @@ def _recommend(
         return "parity", (
             "closed, but neighbouring faces disagree about their front: "
             "counting crossings does not ask for it"
+        )
+    if repair is not None:
+        return "winding" if repair.oriented else "parity", (
+            f"closed but for cracks: with those zipped, the sign is certain further than "
+            f"{repair.width:.2g} units from the surface"
         )
     if open_edge_share > SOUP:
         return "unsigned", (

@@ -5,6 +5,7 @@ from typing import Literal
 
 from ..arrays import Vector3
 from .components import Component
+from .crack_repair import CrackRepair
 from .holes import Hole
 from .self_intersections import SelfIntersections
 
@@ -44,9 +45,9 @@ class TwoSetReport:
     certain_beyond : float
         World units. Fill every hole in any way inside the convex hull of its rim: no point further
         than this from all rims changes sides (see `holes`). 0 for a two-set mesh.
-    crack_width : float or None
-        World units. Moving rim vertices by no more than this closes the mesh; None if it is
-        closed, or if its holes are wider than cracks (see `crack_repair`).
+    repair : CrackRepair or None
+        A weld of nearby vertices that closes a mesh which is open only by cracks; None if it is
+        closed, or if its holes are wider than cracks.
     components : tuple of Component
         In order of their first faces.
     n_degenerate_faces : int
@@ -83,7 +84,7 @@ class TwoSetReport:
     open_edge_share: float
     holes: tuple[Hole, ...]
     certain_beyond: float
-    crack_width: float | None
+    repair: CrackRepair | None
     components: tuple[Component, ...]
     n_degenerate_faces: int
     n_duplicate_faces: int
@@ -94,6 +95,11 @@ class TwoSetReport:
     self_intersections: SelfIntersections | None
     recommended_sign: Sign
     recommended_sign_reason: str
+
+    @property
+    def crack_width(self) -> float | None:
+        """How far vertices must move to close a mesh open only by cracks, world units."""
+        return None if self.repair is None else self.repair.width
 
     @property
     def n_components(self) -> int:

@@ -105,8 +105,8 @@ class Search:
         if len(self.around) == 0 and sum(map(len, self.waiting)) > MANY:
             self.around = faces_around(self.closest.mesh)
         pieces = self._keep(self.waiting.pop(0))
-        if len(pieces) > 0:
-            self.following.append(self._cut(pieces))
+        if len(pieces) > 0 and len(halves := self._cut(pieces)) > 0:
+            self.following.append(halves)
         if not self.waiting:
             self.level += 1
             self.waiting, self.following = self._in_batches(self.following), []

@@ -22,9 +22,9 @@ from ..spatial.closest_point import UNIT_ROUNDOFF, ClosestPoint
 from .branch_and_bound import MAX_LEVEL, Search
 from .enclosure import Enclosure
 
-# Proven bound on all rounding, times (|p - c| + r) as in ClosestPoint: 64 for a distance, 52 for
-# the place of a point (1 to centre it, 3 for a centroid, 1 per level), 12 to evaluate a bound
-ROUNDING = (64 + (MAX_LEVEL + 4) + 12) * UNIT_ROUNDOFF
+# Proven bound on all rounding, times (|p - c| + r) as in ClosestPoint: 64 for a distance, 104 for
+# the place of a point (1 to centre it, 3 for a centroid, 1 per level), 24 to evaluate a bound
+ROUNDING = (64 + (MAX_LEVEL + 4) + 24) * UNIT_ROUNDOFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ def one_sided_hausdorff(
     Notes
     -----
     Accuracy: the enclosure is true in exact arithmetic. Both ends are moved outwards by
-    ``180 u (R + r)``, u = 2**-53, R the largest distance of a source vertex from the centre of the
+    ``192 u (R + r)``, u = 2**-53, R the largest distance of a source vertex from the centre of the
     target's box, r half the diagonal of that box.
     Mean and rms: per face, 3/4 of the value at the centroid and 1/12 at each corner (exact for
     polynomials of degree 2, so for the squared distance to one plane), weighted by area. Where

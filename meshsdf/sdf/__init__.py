@@ -1,7 +1,8 @@
 """mesh -> distance: narrow bands and dense grids, signed by a reasoned choice."""
 
 from .dense import mesh_to_grid
+from .lattice import resolve_voxel_size
 from .narrow_band import mesh_to_band
 from .sign import SignChoice, choose_sign
 
-__all__ = ["SignChoice", "choose_sign", "mesh_to_band", "mesh_to_grid"]
+__all__ = ["SignChoice", "choose_sign", "mesh_to_band", "mesh_to_grid", "resolve_voxel_size"]

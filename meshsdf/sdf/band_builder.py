@@ -29,10 +29,12 @@ SLABS_PER_THREAD = 8  # enough to even out the work, few enough to keep rows lon
 class BandBuilder:
     """The state of one conversion; `build` runs it.
 
-    ``sign`` is "parity", "winding" (integer crossings) or "unsigned".
+    Distances are measured to ``placed``, crossings counted with ``closed``: the same mesh, but for
+    cracks. ``sign`` is "parity", "winding" (integer crossings) or "unsigned".
     """
 
     placed: PlacedMesh
+    closed: PlacedMesh
     lattice: Lattice
     half_width: float
     sign: str
@@ -78,7 +80,9 @@ class BandBuilder:
         edges = np.array([8.0 * low] + [8.0 * b for _, b in self.slabs])
         used = np.flatnonzero(np.diff(features.start)).astype(np.int32)
         reach = self.half_width + 1.0
-        self.faces_of = _bin(points, faces, edges, reach)
+        self.faces_of = self.closed_faces_of = _bin(points, faces, edges, reach)
+        if self.closed is not self.placed:
+            self.closed_faces_of = _bin(points, self.closed.faces, edges, reach)
         self.edges_of = _bin(points, features.ends, edges, reach)
         start, items = _bin(points, used[:, None], edges, reach)
         self.vertices_of = start, used[items]
@@ -180,11 +184,11 @@ class BandBuilder:
         crossings = np.zeros((b - a, 512), np.int32)
         parity = self.sign == "parity"
         leaks = count_crossings(
-            self.placed.points,
-            self.placed.faces,
-            self.placed.edge_line,
-            self.placed.line_ends,
-            _items(self.faces_of, s),
+            self.closed.points,
+            self.closed.faces,
+            self.closed.edge_line,
+            self.closed.line_ends,
+            _items(self.closed_faces_of, s),
             8 * first,
             8 * last,
             self.root,

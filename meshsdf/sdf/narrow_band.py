@@ -97,20 +97,27 @@ def mesh_to_band(
     _check_memory(mesh, size, half_width, closest, max_memory)
     if report is None:
         report = check(mesh, self_intersections=False)
-    choice = choose_sign(report, sign)
+    choice = choose_sign(report, sign, voxel_size=size)
     points, faces = weld_faces(mesh)
-    used = points[np.unique(faces)]
-    lattice = Lattice.around(used, size, origin, half_width)
+    lattice = Lattice.around(points[np.unique(faces)], size, origin, half_width)
     cancel = choice.method if choice.by_crossings else "unsigned"
     placed = place(points, faces, lattice, cancel=cancel)
-    builder = BandBuilder(placed, lattice, half_width, cancel, closest, max_memory, progress)
+    closed = placed
+    if choice.by_crossings and report.repair is not None:
+        closed = place(points, report.repair.labels[faces], lattice, cancel=cancel)
+    builder = BandBuilder(
+        placed, closed, lattice, half_width, cancel, closest, max_memory, progress
+    )
     band = builder.build()
     if choice.by_crossings:
         _check_leaks(sum(builder.leaks))
         return band
     if choice.method == "unsigned":
         return band
-    return sign_by_winding_number(band, mesh, max_memory=max_memory, progress=progress)
+    signed = sign_by_winding_number(band, mesh, max_memory=max_memory, progress=progress)
+    if sign == "auto" and not (signed.values < 0).any():
+        return band  # nothing is wound about: a sheet
+    return signed
 
 
 def _check_half_width(half_width: Number) -> None:

@@ -15,7 +15,7 @@ from ..arrays import FaceLabels, Faces, Points
 from ..errors import SdfError
 from ..kernels.vertex_edges import edges_of_vertices
 from ..mesh import Mesh, degenerate_faces, net_faces, odd_faces, residual_edge_lines, weld
-from ..mesh.edge_table import edge_table
+from ..mesh.edge_table import EdgeTable, edge_table
 from .lattice import Lattice
 
 
@@ -52,25 +52,25 @@ class PlacedMesh:
         Faces that bound something.
     face_ids : (m,) int32
         Their numbers in the mesh.
+    table : EdgeTable
+        Their edges.
     edge_line : (m, 3) or (0, 3) int32
         Supporting line of edges that cancel only geometrically, else -1; empty when there are none.
     line_ends : (g, 2) int32
         The two outermost vertices on each supporting line.
-    n_dropped : int
-        Faces that were left out.
     """
 
     points: Points
     faces: Faces
     face_ids: FaceLabels
+    table: EdgeTable
     edge_line: Int32[np.ndarray, "l 3"]
     line_ends: Int32[np.ndarray, "g 2"]
-    n_dropped: int
 
     @cached_property
     def features(self) -> Features:
         """Edges and vertices of the faces."""
-        table = edge_table(self.faces, len(self.points))
+        table = self.table
         first = np.zeros(len(table.edges) + 1, np.int32)
         np.cumsum(table.n_uses, out=first[1:])
         start = np.empty(len(self.points) + 1, np.int32)
@@ -117,14 +117,8 @@ def place(points: Points, faces: Faces, lattice: Lattice, *, cancel: str) -> Pla
             f'mesh_to_band(sign="{cancel}")',
             'pass sign="unsigned" to measure the distance to the sheets',
         )
-    edge_line, line_ends = residual_edge_lines(faces, points)
-    if len(edge_line):
-        edge_line = edge_line[keep]
-    return PlacedMesh(
-        lattice.to_local(points),
-        np.ascontiguousarray(faces[keep]),
-        np.flatnonzero(keep).astype(np.int32),
-        np.ascontiguousarray(edge_line),
-        line_ends,
-        int(len(faces) - keep.sum()),
-    )
+    face_ids = np.flatnonzero(keep).astype(np.int32)
+    faces = np.ascontiguousarray(faces[keep])
+    table = edge_table(faces, len(points))
+    edge_line, line_ends = residual_edge_lines(faces, points, table=table)
+    return PlacedMesh(lattice.to_local(points), faces, face_ids, table, edge_line, line_ends)

@@ -3,8 +3,11 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from ..arrays import Number
 from ..errors import SdfError
 from ..mesh.two_set import TwoSetReport
+
+CRACK_SHARE = 0.5  # of a voxel: wider cracks could be seen by a node, and get winding numbers
 
 SignMethod = Literal["auto", "parity", "winding", "unsigned"]
 
@@ -31,8 +34,19 @@ class SignChoice:
     warnings: tuple[str, ...] = ()
 
 
-def choose_sign(report: TwoSetReport, sign: SignMethod = "auto") -> SignChoice:
+def choose_sign(
+    report: TwoSetReport, sign: SignMethod = "auto", *, voxel_size: Number | None = None
+) -> SignChoice:
     """Choose the sign method from the answer of `check`, or confirm the one asked for.
+
+    Parameters
+    ----------
+    report : TwoSetReport
+        What `check` found.
+    sign : "auto", "parity", "winding" or "unsigned"
+        What the user wants.
+    voxel_size : float, optional
+        World units. Cracks narrower than half of it are zipped for the sign.
 
     Raises
     ------
@@ -45,24 +59,42 @@ def choose_sign(report: TwoSetReport, sign: SignMethod = "auto") -> SignChoice:
             "mesh_to_band(sign=...)",
             "choose auto, parity, winding or unsigned",
         )
+    zipped = report.repair is not None and (
+        voxel_size is None or report.repair.width < CRACK_SHARE * voxel_size
+    )
+    oriented = report.oriented or (zipped and report.repair.oriented)
+    closed = report.two_set or zipped
+    reason = report.recommended_sign_reason if sign == "auto" else "as asked"
     if sign == "auto":
-        sign, reason = report.recommended_sign, report.recommended_sign_reason
-    else:
-        reason = "as asked"
+        sign = report.recommended_sign
+        if not closed and sign == "parity":
+            sign, reason = "winding", "its cracks are too wide for these voxels"
+    warnings = _crack_warnings(report) if zipped and sign != "unsigned" else ()
     if sign == "unsigned":
         return SignChoice("unsigned", False, reason, ("distances carry no sign",))
     if sign == "parity":
-        if not report.two_set:
+        if not closed:
             raise SdfError(
                 f"{report.n_open_edges} open edges, so crossings do not tell inside from outside",
                 'mesh_to_band(sign="parity")',
                 'pass sign="winding", or close the mesh',
             )
-        return SignChoice("parity", True, reason)
-    if report.oriented:
-        return SignChoice("winding", True, reason)
+        return SignChoice("parity", True, reason, warnings)
+    if oriented:
+        return SignChoice("winding", True, reason, warnings)
+    return SignChoice("winding", False, reason, _opening_warnings(report))
+
+
+def _crack_warnings(report: TwoSetReport) -> tuple[str, ...]:
+    n, width = len(report.holes), report.repair.width
+    cracks = "1 crack" if n == 1 else f"{n} cracks"
+    return (f"{cracks} zipped for the sign, which is certain beyond {width:.2g} units",)
+
+
+def _opening_warnings(report: TwoSetReport) -> tuple[str, ...]:
     warnings = ("inside is where the generalised winding number exceeds 1/2 in magnitude",)
     if not report.two_set:
         n = len(report.holes)
-        warnings += (f"{n} hole{'s' * (n != 1)}: the sign near an opening is an estimate",)
-    return SignChoice("winding", False, reason, warnings)
+        holes = "1 hole" if n == 1 else f"{n} holes"
+        warnings += (f"{holes}: the sign near an opening is an estimate",)
+    return warnings

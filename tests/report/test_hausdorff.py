@@ -10,7 +10,7 @@ from meshsdf.mesh.primitives import box_mesh, icosphere, tetrahedron
 from meshsdf.report.hausdorff import hausdorff, one_sided_hausdorff
 from meshsdf.spatial import ClosestPoint
 
-ROUNDING = 1e-12  # 180 u times coordinates below 10, twice, and the closed formula's own
+ROUNDING = 1e-12  # 192 u times coordinates below 10, twice, and the closed formula's own
 
 
 def folded_quad(height, *, along):
