@@ -27,7 +27,10 @@ def solids() -> dict[str, tuple[Mesh, int]]:
         "box.obj": (box_mesh((1.0, 2.0, 3.0)), 0),
         "gear.obj": (gear(n_teeth=18, outer=1.0, root=0.82, bore=0.3, thickness=0.4), 1),
         "trefoil.ply": (trefoil_tube(0.4, n_along=300, n_around=32), 1),
-        "gyroid.ply": (gyroid_slab(n=32, n_high=12, n_waves=2, half_thickness=0.45), 0),
+        "gyroid.ply": (
+            gyroid_slab(n=32, n_high=12, n_waves=2, phase=0.4, half_thickness=0.6),
+            29,
+        ),
         "lattice.ply": (lattice(n_nodes=5, period=4), 3 * 25 * 4 - 125 + 1),
     }
 

@@ -44,10 +44,12 @@ def lattice(*, n_nodes: int, period: int) -> Mesh:
     return Mesh(corners - 0.5 * (size + 2), _two_triangles(which.reshape(-1, 4)))
 
 
-def gyroid_slab(*, n: int, n_high: int, n_waves: float, half_thickness: float) -> Mesh:
+def gyroid_slab(
+    *, n: int, n_high: int, n_waves: float, phase: float, half_thickness: float
+) -> Mesh:
     """A plate of 1 x 1 x n_high/n cut from a thickened gyroid sheet, closed where it is cut."""
     ijk = np.indices((n + 3, n + 3, n_high + 3)) - 1.0
-    x, y, z = 2 * np.pi * n_waves / n * ijk
+    x, y, z = 2 * np.pi * n_waves / n * ijk + phase
     sheet = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
     lower, upper = ijk, np.array([n, n, n_high])[:, None, None, None] - ijk
     # The box stops a quarter cell beyond its last nodes, so no node lies on it.

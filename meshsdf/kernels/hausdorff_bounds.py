@@ -152,25 +152,25 @@ def _fan(points, squares, slots, piece, corners, order, around, ring, least):
             at_h = place if ring[FACE, MAX_FAN + place] == h else at_h
         if at_g == MAX_FAN or at_h == MAX_FAN:
             continue
-        # Strip: one of the three gaps of a closed ring is left out
-        for turn in range(4 if period > 0 else 1):
-            p, q = at_g - period * (turn & 1), at_h - period * (turn >> 1)
-            if period > 0 and max(0, p, q) - min(0, p, q) >= period:
+        # Strips leave one of the gaps of a closed ring out; the last try is the fan
+        for turn in range(5 if period > 0 else 1):
+            p, q, end = at_g - period * (turn & 1), at_h - period * ((turn >> 1) & 1), 0
+            found = feet
+            if turn == 4:
+                p, q, end = at_g, at_h, period
+                if at_g > at_h:
+                    p, q, end = at_g - period, at_h - period, -period
+                v = corners[f, k]
+                found = max(feet, closest_on_triangle(v[0], v[1], v[2], a, b, c)[0])
+            elif period > 0 and max(0, p, q) - min(0, p, q) >= period:
                 continue
-            found = max(feet, _cuts(a, b, 0, p, ring, period, w, corners, around))
-            found = max(found, _cuts(b, c, p, q, ring, period, w, corners, around))
-            found = max(found, _cuts(a, c, 0, q, ring, period, w, corners, around))
-            least = min(least, found)
-        # Fan: once around w
-        if period > 0:
-            p, q, end = at_g, at_h, period
-            if at_g > at_h:
-                p, q, end = at_g - period, at_h - period, -period
-            found = max(feet, _cuts(a, b, 0, p, ring, period, w, corners, around))
-            found = max(found, _cuts(b, c, p, q, ring, period, w, corners, around))
-            found = max(found, _cuts(c, a, q, end, ring, period, w, corners, around))
-            v = corners[f, k]
-            found = max(found, closest_on_triangle(v[0], v[1], v[2], a, b, c)[0])
+            for side in range(3):
+                start, stop = points[piece[side]], points[piece[(side + 1) % 3]]
+                first = 0 if side == 0 else (p if side == 1 else q)
+                last = p if side == 0 else (q if side == 1 else end)
+                found = max(
+                    found, _cuts(start, stop, first, last, ring, period, w, corners, around)
+                )
             least = min(least, found)
     return least
 

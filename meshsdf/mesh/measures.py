@@ -68,10 +68,12 @@ def euler_number(mesh: Mesh) -> int:
 
 
 def n_components(mesh: Mesh) -> int:
-    """Return the number of pieces, where faces that share a vertex index hang together."""
-    used, corner = np.unique(mesh.faces, return_inverse=True)
-    corners = corner.reshape(-1, 3)
-    return _n_pieces(len(used), corners[:, [0, 1, 1, 2]].reshape(-1, 2))
+    """Return the number of pieces, where faces that share an edge by index hang together."""
+    edges, which = np.unique(np.sort(directed_edges(mesh), axis=1), axis=0, return_inverse=True)
+    # A graph of faces and edges; the sides of face f are rows f, f + m and f + 2 m.
+    face = np.tile(np.arange(mesh.n_faces), 3)
+    links = np.column_stack([face, mesh.n_faces + which.ravel()])
+    return _n_pieces(mesh.n_faces + len(edges), links)
 
 
 def is_watertight(mesh: Mesh) -> bool:

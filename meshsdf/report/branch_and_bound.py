@@ -21,7 +21,7 @@ from ..spatial.closest_point import ClosestPoint
 
 BATCH = 16384  # pieces cut at a time: large enough for threads, small enough to learn from
 PIECES_PER_TASK = 4096
-MANY = 1000  # pieces; from here on it pays to know which faces of the target touch
+MANY, STUBBORN = 1000, 4  # pieces, level: then it pays to know which faces of the target touch
 MAX_LEVEL = 100  # a piece is then 2**-50 of its triangle's size: rounding
 RELATIVE_TOLERANCE = 1e-3  # of the distance itself: three digits are enough to compare
 DIAGONAL_TOLERANCE = 1e-6  # of the target's diagonal, for surfaces that coincide
@@ -102,7 +102,8 @@ class Search:
 
     def step(self) -> None:
         """Cut one batch of pieces in two."""
-        if len(self.around) == 0 and sum(map(len, self.waiting)) > MANY:
+        is_slow = self.level >= STUBBORN or sum(map(len, self.waiting)) > MANY
+        if is_slow and len(self.around) == 0:
             self.around = faces_around(self.closest.mesh)
         pieces = self._keep(self.waiting.pop(0))
         if len(pieces) > 0 and len(halves := self._cut(pieces)) > 0:

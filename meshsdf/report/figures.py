@@ -15,7 +15,7 @@ from .roundtrip import RoundTrip
 
 INK, BLUE, ORANGE, GREY = "#222222", "#0072b2", "#d55e00", "#9a9a9a"  # Okabe and Ito 2008
 LIGHT = np.array([0.35, -0.6, 0.72])
-PNG_OPTIONS = {"dpi": 144, "metadata": {"Software": None}}
+PNG_OPTIONS = {"dpi": 110, "metadata": {"Software": None}}
 
 
 def draw_errors(trip: RoundTrip, path: Path, *, title: str) -> None:
@@ -58,7 +58,7 @@ def draw_surfaces(meshes: list[tuple[str, Mesh]], path: Path) -> None:
         _add_triangles(axes, mesh.triangles, colors)
         for axis, center in zip("xyz", box.center, strict=True):
             getattr(axes, f"set_{axis}lim")(center - half, center + half)
-        axes.set_box_aspect((1, 1, 1), zoom=1.45)
+        axes.set_box_aspect((1, 1, 1), zoom=1.35)
         axes.view_init(elev=38, azim=-60)
         axes.set_axis_off()
         axes.set_title(title, color=INK, fontsize=11)

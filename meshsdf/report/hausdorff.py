@@ -127,6 +127,13 @@ def one_sided_hausdorff(
     Cost: one closest point per vertex and per face of the source, and three per cut. Where the
     distance is nearly constant, as between offset surfaces, or nearly zero between different
     triangulations of one surface, many cuts are needed; a looser tolerance saves most of them.
+
+    Examples
+    --------
+    >>> from meshsdf.mesh.primitives import box_mesh
+    >>> side = one_sided_hausdorff(box_mesh((2.0, 2.0, 2.0)), box_mesh())
+    >>> print(side.distance)  # corner to corner: sqrt(3) / 2
+    [0.866025, 0.866026]
     """
     _check(source, target, tolerance)
     start = monotonic()

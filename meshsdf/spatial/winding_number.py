@@ -2,10 +2,10 @@
 
 1 inside and 0 outside a closed mesh with outward faces; for open or overlapping soups a smooth
 value between, for which "above 1/2" is the usual reading of "inside" (Jacobson, Kavan,
-Sorkine-Hornung 2013, doi:10.1145/2461912.2461916). libigl does the sums; it is called here only.
+Sorkine-Hornung 2013, doi:10.1145/2461912.2461916). libigl does the sums; it is called here only,
+and imported at the first call, because that takes half a second.
 """
 
-import igl
 import numpy as np
 
 from ..arrays import Points, Values
@@ -33,11 +33,12 @@ def winding_number(mesh: Mesh, points: Points, *, exact: bool = False) -> Values
 
     Notes
     -----
-    Accuracy: exact, about ``1e-16 * m`` away from the surface. Otherwise a second-order expansion
-    in float32 (Barill et al. 2018, doi:10.1145/3197517.3201337) without a proven bound: errors
-    around 1e-3 are usual, and the value jumps by 1 across the surface, so within rounding of it
-    (1e-6 of the mesh's size) either side may be answered. Use it to tell inside from outside
-    (against 1/2), never as a measure; points whose value lies near 1/2 deserve ``exact=True``.
+    Accuracy: exact, about 1e-16 per face, away from the surface. Otherwise a second-order
+    expansion in float32 (Barill et al. 2018, doi:10.1145/3197517.3201337) without a proven bound;
+    4e-3 was the largest error among random points around four closed and open scans. The value
+    jumps by 1 across the surface, so within rounding of it (1e-6 of the mesh's size) either side
+    may be answered. Use it to tell inside from outside (against 1/2), never as a measure; points
+    whose value lies near 1/2 deserve ``exact=True``.
     On the surface itself the number is not defined, and any value may come back.
     Coordinates are centred on the mesh's box and divided by its longest side first, which changes
     no winding number and spares float32 the offset.
@@ -48,6 +49,8 @@ def winding_number(mesh: Mesh, points: Points, *, exact: bool = False) -> Values
         raise SpatialError(what, "winding_number(points=...)", "leave those points out")
     if mesh.n_faces == 0 or len(points) == 0:
         return np.zeros(len(points))
+    import igl
+
     box = mesh.box
     scale = box.longest_side if box.longest_side > 0 else 1.0
     vertices = (mesh.vertices - box.center) / scale

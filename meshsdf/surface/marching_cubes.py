@@ -19,6 +19,7 @@ from .brick_field import BrickField, field_of_band, field_of_grid, in_ranges
 from .cap import weld_border_nodes
 from .cube_cases import cube_cases
 
+BORDERS = ("open", "cap", "pad")
 MAX_VERTICES = 2**31 - 1  # faces are int32
 
 
@@ -54,9 +55,10 @@ def marching_cubes(
     Raises
     ------
     SurfaceError
-        The level is not finite, outside the band, or not above 0 for an unsigned volume; the grid
-        has an axis with fewer than 2 nodes; the surface would need more than 2^31 - 1 vertices;
-        or the band marks missing bricks side by side as inside and outside.
+        The level is not finite, outside the band, or not above 0 for an unsigned volume; the border
+        is none of the three; the grid has an axis with fewer than 2 nodes; the surface would need
+        more than 2^31 - 1 vertices; or the band marks missing bricks side by side as inside and
+        outside.
 
     Notes
     -----
@@ -89,18 +91,19 @@ def marching_cubes(
     >>> mesh.n_vertices - mesh.n_faces // 2  # Euler characteristic of a sphere
     2
     """
-    _check(volume, level)
+    _check(volume, level, border)
     level = float(level)
+    is_capped = border == "cap" and isinstance(volume, Grid)
     if isinstance(volume, NarrowBand):
         field, translation = field_of_band(volume, level, progress), volume.translation
     else:
         field, translation = field_of_grid(volume, level, border, progress), volume.origin
-    toward_infinity = 0.0 if border == "cap" else 0.5
+    toward_infinity = 0.0 if is_capped else 0.5
     place = np.array(
         [field.background, level, toward_infinity, volume.voxel_size, *translation], float
     )
     vertices, faces, crossings = _extract(field, place, progress)
-    if border == "cap" and isinstance(volume, Grid):
+    if is_capped:
         vertices, faces = weld_border_nodes(
             vertices, faces, crossings, field.corners, volume.values.shape
         )
@@ -175,8 +178,12 @@ def _separate_fans(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray,
     return vertices[origin[ordered]], rank[fan].reshape(-1, 3)
 
 
-def _check(volume: NarrowBand | Grid, level: float) -> None:
+def _check(volume: NarrowBand | Grid, level: float, border: str) -> None:
     where = "marching_cubes(level=...)"
+    if border not in BORDERS:
+        raise SurfaceError(
+            f"border is {border!r}", "marching_cubes(border=...)", f"pass one of {BORDERS}"
+        )
     if not np.isfinite(level):
         raise SurfaceError(f"level is {level}", where, "pass a finite number")
     if not volume.is_signed and level <= 0:

@@ -144,15 +144,19 @@ def test_loops_count_the_holes_by_index():
     assert n_boundary_loops(soup) == n_components(soup) == 320
 
 
-def test_components_meet_at_shared_vertices_only():
-    two = joined(box_mesh(), box_mesh(center=(1.0, 1.0, 1.0)))
+def test_components_meet_at_shared_edges_only():
+    two = joined(box_mesh(), box_mesh(center=(1.0, 1.0, 0.0)))
     assert n_components(two) == 2
     corner = two.faces.copy()
-    corner[corner == 8] = 7  # the corner where they touch becomes one vertex
+    corner[corner == 8] = 6  # one end of the edge along which they touch becomes one vertex
     touching = Mesh(two.vertices, corner)
-    assert n_components(touching) == 1
+    assert n_components(touching) == 2
     assert euler_number(touching) == 3
     assert is_watertight(touching)
+    corner[corner == 9] = 7
+    hinged = Mesh(two.vertices, corner)
+    assert n_components(hinged) == 1
+    assert not is_watertight(hinged)
 
 
 def test_unused_vertices_count_for_nothing_and_no_faces_measure_zero():

@@ -13,7 +13,7 @@ from meshsdf.spatial import ClosestPoint
 from tests.oracles import closest_by_brute_force
 
 
-def random_soup(seed, m=300):
+def random_soup(seed, m=160):
     """Triangles of all sizes; some are segments and points."""
     rng = np.random.default_rng(seed)
     corners = rng.normal(size=(m, 1, 3)) + 10.0 ** rng.uniform(-3, 0, (m, 1, 1)) * rng.normal(

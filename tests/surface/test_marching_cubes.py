@@ -222,6 +222,19 @@ def test_bricks_may_have_any_coordinates():
         assert np.array_equal(triangle_set(marching_cubes(band)), triangle_set(dense))
 
 
+def test_an_inside_block_whose_neighbours_hold_no_inside_node_is_closed_through_missing_bricks():
+    blocks = np.full((5, 5, 5, 8, 8, 8), 4.0)
+    for neighbour in ((1, 2, 2), (3, 2, 2), (2, 1, 2), (2, 3, 2), (2, 2, 1), (2, 2, 3)):
+        blocks[neighbour] = 1.0
+    blocks[2, 2, 2] = -4.0  # missing, as are the blocks beside its edges and corners
+    band = band_from_blocks(blocks, (0, 0, 0), half_width=4.0)
+    assert band.index.n_bricks == 6
+    mesh = marching_cubes(band)
+    assert_closed(mesh)
+    nodes = blocks.transpose(0, 3, 1, 4, 2, 5).reshape(40, 40, 40)
+    assert np.array_equal(triangle_set(mesh), triangle_set(marching_cubes(unit_grid(nodes))))
+
+
 def test_blocks_missing_inside_a_shape_are_inside():
     def distance(points):
         return sphere_distance(points, (32.5, 31.25, 33.75), 21.0)
@@ -347,6 +360,20 @@ def test_an_unsigned_volume_needs_a_level_above_zero_and_then_gets_a_shell():
 def test_a_grid_without_a_cell_is_refused():
     with pytest.raises(SurfaceError, match="5 x 1 x 4 nodes"):
         marching_cubes(unit_grid(np.ones((5, 1, 4))))
+
+
+def test_a_border_of_another_name_is_refused():
+    check = importlib.import_module("meshsdf.surface.marching_cubes")._check
+    with pytest.raises(SurfaceError, match=r"border is 'closed'(.|\n)*'open', 'cap', 'pad'"):
+        check(unit_grid(np.ones((2, 2, 2))), 0.0, "closed")
+
+
+def test_more_vertices_than_faces_can_name_are_refused(monkeypatch):
+    module = importlib.import_module("meshsdf.surface.marching_cubes")
+    monkeypatch.setattr(module, "MAX_VERTICES", 5)
+    one_inside = np.pad([[[-1.0]]], 1, constant_values=1.0)
+    with pytest.raises(SurfaceError, match="6 vertices, faces can name 5"):
+        marching_cubes(unit_grid(one_inside))
 
 
 def test_missing_bricks_that_contradict_each_other_are_refused():
