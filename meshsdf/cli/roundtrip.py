@@ -58,7 +58,7 @@ def command(
     console.watch_compilation()
     from ..io import read_mesh
     from ..mesh.two_set import check
-    from ..report.roundtrip import RoundTrip, roundtrip
+    from ..report.roundtrip import roundtrip
     from ..report.words import roundtrip_table
     from ..sdf import choose_sign
 
@@ -68,22 +68,18 @@ def command(
     with console.stage("check"):
         report = check(loaded, self_intersections=False)
         choice = choose_sign(report, sign)
-    rows, waiting = [], list(resolutions)
-    while waiting:
-        resolution = waiting.pop(0)
-        rows += roundtrip(
-            loaded,
-            [resolution],
-            sign=sign,
-            half_width=half_width,
-            report=report,
-            max_memory=max_memory,
-            progress=console.progress,
-        ).rows
-        if until is not None and not waiting and rows[-1].comparison.distance.upper > until:
-            waiting.append(2 * resolution)
+    trip = roundtrip(
+        loaded,
+        resolutions,
+        sign=sign,
+        half_width=half_width,
+        until=until,
+        report=report,
+        max_memory=max_memory,
+        progress=console.progress,
+    )
+    rows = trip.rows
     console.close()
-    trip = RoundTrip(tuple(rows))
     for warning in [*warnings, *choice.warnings, *rows[-1].warnings]:
         console.say(f"warning: {warning}")
     passed = max_error is None or rows[-1].is_within(*max_error)

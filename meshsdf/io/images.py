@@ -14,18 +14,20 @@ _MORE_IMAGE_ERRORS = (AttributeError, OverflowError, MemoryError, struct.error, 
 _KEPT_MODES = {"L", "LA", "RGB", "RGBA"}
 
 
-def read_image(source: Path | bytes, warn: Warn) -> np.ndarray | None:
-    """Return the (h, w, c) uint8 image, c = 1 to 4; None, said through ``warn``, if unreadable."""
+def read_image(source: Path | object, warn: Warn) -> np.ndarray | None:
+    """Return the (h, w, c) uint8 image, c = 1 to 4; None, said through ``warn``, if unreadable.
+
+    ``source`` is a file or an image that Pillow opened.
+    """
     from PIL import Image
 
     shown = repr(source.name) if isinstance(source, Path) else "stored in the file"
-    file = source if isinstance(source, Path) else io.BytesIO(source)
     bombs = (Image.DecompressionBombWarning, Image.DecompressionBombError)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(file) as image:
+            with Image.open(source) if isinstance(source, Path) else source as image:
                 pixels = np.asarray(image.convert(_mode(image)))
     except bombs as error:
         warn(f"image {shown} is left out, it is too large: {error}")

@@ -5,12 +5,14 @@ Whether positions close what indices leave open is answered by the two-set check
 """
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import FaceValues
+from .edge_table import EdgeTable, edge_table
 from .mesh import Mesh
+from .weld import weld
 
 
 def face_areas(mesh: Mesh) -> FaceValues:
@@ -61,19 +63,21 @@ def volume(mesh: Mesh) -> float:
 def euler_number(mesh: Mesh) -> int:
     """Return vertices - edges + faces, of the vertices that faces use and the edges by index.
 
-    A closed surface of genus g that shares no edge or vertex with another has ``2 - 2 * g``.
+    A closed surface of genus g that shares no edge or vertex with another has ``2 - 2 * g``. Sides
+    that join a vertex to itself are no edges.
     """
-    edges = np.unique(np.sort(directed_edges(mesh), axis=1), axis=0)
-    return len(np.unique(mesh.faces)) - len(edges) + mesh.n_faces
+    used = np.zeros(mesh.n_vertices, bool)
+    used[mesh.faces] = True
+    return int(used.sum()) - len(_edges(mesh).edges) + mesh.n_faces
 
 
 def n_components(mesh: Mesh) -> int:
     """Return the number of pieces, where faces that share an edge by index hang together."""
-    edges, which = np.unique(np.sort(directed_edges(mesh), axis=1), axis=0, return_inverse=True)
-    # A graph of faces and edges; the sides of face f are rows f, f + m and f + 2 m.
-    face = np.tile(np.arange(mesh.n_faces), 3)
-    links = np.column_stack([face, mesh.n_faces + which.ravel()])
-    return _n_pieces(mesh.n_faces + len(edges), links)
+    table = _edges(mesh)
+    # A graph of faces and edges
+    face, side = np.nonzero(table.edge_of_corner >= 0)
+    links = np.column_stack([face, mesh.n_faces + table.edge_of_corner[face, side]])
+    return _n_pieces(mesh.n_faces + len(table.edges), links)
 
 
 def is_watertight(mesh: Mesh) -> bool:
@@ -84,12 +88,9 @@ def is_watertight(mesh: Mesh) -> bool:
     Sufficient for an inside, not necessary: self-intersections pass, while T-junctions, unwelded
     vertices and four faces on one edge do not. A mesh without faces is not watertight.
     """
-    edges = directed_edges(mesh)
-    _, which, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    direction = np.bincount(which.ravel(), weights=np.sign(edges[:, 1] - edges[:, 0]))
-    return mesh.n_faces > 0 and bool((count == 2).all() and (direction == 0).all())
+    table = _edges(mesh)
+    has_edges = mesh.n_faces > 0 and bool((table.edge_of_corner >= 0).all())
+    return has_edges and bool((table.n_uses == 2).all()) and table.is_balanced
 
 
 def n_boundary_loops(mesh: Mesh) -> int:
@@ -97,16 +98,19 @@ def n_boundary_loops(mesh: Mesh) -> int:
 
     Loops that touch at a vertex count as one.
     """
-    edges, count = np.unique(np.sort(directed_edges(mesh), axis=1), axis=0, return_counts=True)
-    used, ends = np.unique(edges[count == 1], return_inverse=True)
+    table = _edges(mesh)
+    used, ends = np.unique(table.edges[table.n_uses == 1], return_inverse=True)
     return _n_pieces(len(used), ends.reshape(-1, 2))
 
 
-def directed_edges(mesh: Mesh) -> Int64[np.ndarray, "e 2"]:
-    """(3 m, 2) start and end of every face's sides: all first sides, then second, then third."""
-    a, b, c = mesh.faces.astype(np.int64).T
-    start, end = np.concatenate([a, b, c]), np.concatenate([b, c, a])
-    return np.column_stack([start, end])
+def welded(mesh: Mesh) -> Mesh:
+    """Return the shape of the mesh with equal positions made one vertex, attributes left out."""
+    labels, points = weld(mesh.vertices)
+    return Mesh(points, labels[mesh.faces])
+
+
+def _edges(mesh: Mesh) -> EdgeTable:
+    return edge_table(mesh.faces, mesh.n_vertices)
 
 
 def _n_pieces(n_nodes: int, links: np.ndarray) -> int:

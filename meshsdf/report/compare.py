@@ -4,7 +4,14 @@ from dataclasses import asdict, dataclass
 
 from ..errors import ReportError
 from ..mesh import Mesh
-from ..mesh.measures import area, euler_number, is_watertight, n_components, volume
+from ..mesh.measures import (
+    area,
+    euler_number,
+    is_watertight,
+    n_components,
+    volume,
+    welded,
+)
 from ..progress import Progress, silent
 from .enclosure import Enclosure, ceil_digits, floor_digits
 from .hausdorff import OneSided, hausdorff
@@ -12,14 +19,14 @@ from .hausdorff import OneSided, hausdorff
 
 @dataclass(frozen=True)
 class Measures:
-    """Sizes and counts of one mesh; counts go by vertex index.
+    """Sizes and counts of one mesh; counts of pieces and edges go by position, equal ones joined.
 
     Attributes
     ----------
     area : float
         Square world units.
     volume : float or None
-        Cubic world units; None unless the mesh is watertight by index.
+        Cubic world units; None unless the mesh is watertight once equal positions are joined.
     """
 
     n_vertices: int
@@ -178,14 +185,15 @@ def compare(
 
 
 def _measures(mesh: Mesh) -> Measures:
-    closed = is_watertight(mesh)
+    joined = welded(mesh)
+    closed = is_watertight(joined)
     return Measures(
         n_vertices=mesh.n_vertices,
         n_faces=mesh.n_faces,
         area=area(mesh),
         volume=volume(mesh) if closed else None,
-        euler_number=euler_number(mesh),
-        n_components=n_components(mesh),
+        euler_number=euler_number(joined),
+        n_components=n_components(joined),
         is_watertight=closed,
     )
 

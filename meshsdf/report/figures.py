@@ -23,17 +23,20 @@ def draw_errors(trip: RoundTrip, path: Path, *, title: str) -> None:
     figure = Figure(figsize=(6.4, 4.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    sizes = np.array([row.voxel_size for row in trip.rows])
-    lower = np.array([row.comparison.distance.lower for row in trip.rows])
-    upper = np.array([row.comparison.distance.upper for row in trip.rows])
-    mean = np.array([row.comparison.forward.mean for row in trip.rows])
+    rows = [row for row in trip.rows if row.comparison is not None]
+    sizes = np.array([row.voxel_size for row in rows])
+    lower = np.array([row.comparison.distance.lower for row in rows])
+    upper = np.array([row.comparison.distance.upper for row in rows])
+    mean = np.array([row.comparison.forward.mean for row in rows])
     axes.fill_between(sizes, lower, upper, color=BLUE, alpha=0.3, linewidth=0)
     axes.plot(sizes, upper, "o-", color=BLUE, label="largest distance (certified interval)")
     axes.plot(sizes, mean, "s-", color=ORANGE, label="mean distance, mesh to round trip")
     axes.plot(sizes, sizes, ":", color=GREY, label="one voxel")
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xticks(sizes, [f"{size:.3g}\n1/{row.resolution:g}" for size, row in _pairs(trip)])
+    axes.set_xticks(
+        sizes, [f"{size:.3g}\n1/{row.resolution:g}" for size, row in zip(sizes, rows, strict=True)]
+    )
     axes.minorticks_off()
     axes.set_xlabel("voxel size, world units, and resolution")
     axes.set_ylabel("distance, world units")
@@ -71,7 +74,3 @@ def _add_triangles(axes, triangles: np.ndarray, colors: np.ndarray) -> None:
     axes.add_collection3d(
         Poly3DCollection(triangles, facecolors=colors, edgecolors=colors, linewidths=0.2)
     )
-
-
-def _pairs(trip: RoundTrip):
-    return ((row.voxel_size, row) for row in trip.rows)

@@ -13,7 +13,7 @@ from ..mesh.two_set import TwoSetReport, check
 from ..progress import Progress, silent
 from ..sdf import mesh_to_band
 from ..sdf.sign import SignMethod
-from ..surface import default_level, marching_cubes, require_faces
+from ..surface import default_level, marching_cubes
 from .compare import Comparison, compare
 
 VOXEL_SHARE = 1e-2
@@ -31,7 +31,7 @@ class RoundTripRow:
     voxel_size : float
         World units.
     comparison : Comparison
-        The mesh against its round trip.
+        The mesh against its round trip; None when nothing came back.
     surface : Mesh
         What came back.
     sign : str
@@ -44,7 +44,7 @@ class RoundTripRow:
 
     resolution: float
     voxel_size: float
-    comparison: Comparison
+    comparison: Comparison | None
     surface: Mesh
     sign: str
     warnings: tuple[str, ...]
@@ -52,13 +52,18 @@ class RoundTripRow:
 
     def is_within(self, limit: Number, in_voxels: bool = False) -> bool:
         """Whether the error is certainly at most ``limit``, in world units or in voxels."""
+        if self.comparison is None:
+            return False
         scale = self.voxel_size if in_voxels else 1.0
         return self.comparison.distance.upper <= limit * scale
 
     def to_json(self) -> dict:
         """Return plain types, as the command prints them."""
         head = {"resolution": self.resolution, "voxel_size": self.voxel_size, "sign": self.sign}
-        body = self.comparison.to_json()
+        if self.comparison is None:
+            body = {"hausdorff": None, "forward": None, "backward": None}
+        else:
+            body = self.comparison.to_json()
         return head | body | {"warnings": list(self.warnings), "seconds": self.seconds}
 
 
@@ -72,12 +77,13 @@ class RoundTrip:
     def order(self) -> float | None:
         """Slope of log error against log voxel size by least squares; None for one row.
 
-        The error is the middle of each row's interval of the Hausdorff distance.
+        The error is the largest distance seen: the lower end of each row's interval.
         """
-        if len({row.voxel_size for row in self.rows}) < 2:
+        rows = [row for row in self.rows if row.comparison is not None]
+        if len({row.voxel_size for row in rows}) < 2:
             return None
-        sizes = np.array([row.voxel_size for row in self.rows])
-        errors = np.array([row.comparison.distance.middle for row in self.rows])
+        sizes = np.array([row.voxel_size for row in rows])
+        errors = np.array([row.comparison.distance.lower for row in rows])
         if (errors <= 0).any():
             return None
         return _slope(np.log(sizes), np.log(errors))
@@ -89,6 +95,7 @@ def roundtrip(
     *,
     sign: SignMethod = "auto",
     half_width: Number = 3.0,
+    until: Number | None = None,
     report: TwoSetReport | None = None,
     max_memory: Number | None = None,
     progress: Progress = silent,
@@ -103,13 +110,16 @@ def roundtrip(
         Voxels along the longest side, one row each.
     sign, half_width, report, max_memory, progress
         As for `mesh_to_band`.
+    until : float, optional
+        World units. Double the last resolution until the error is certainly below, or until
+        memory ends the search.
 
     Raises
     ------
     ReportError
         No resolution given.
-    SdfError, SurfaceError, MemoryLimitError
-        The mesh cannot be converted, or nothing comes back.
+    SdfError, MemoryLimitError
+        The mesh cannot be converted.
 
     Notes
     -----
@@ -127,7 +137,13 @@ def roundtrip(
         "max_memory": max_memory,
         "progress": progress,
     }
-    return RoundTrip(tuple(_row(mesh, resolution, options) for resolution in resolutions))
+    rows, waiting = [], list(resolutions)
+    while waiting:
+        resolution = waiting.pop(0)
+        rows.append(_row(mesh, resolution, options))
+        if not waiting and until is not None and not rows[-1].is_within(until):
+            waiting.append(2 * resolution)
+    return RoundTrip(tuple(rows))
 
 
 def _row(mesh: Mesh, resolution: Number, options: dict) -> RoundTripRow:
@@ -136,15 +152,18 @@ def _row(mesh: Mesh, resolution: Number, options: dict) -> RoundTripRow:
     marks.append(time.perf_counter())
     level, warnings = default_level(band)
     surface = marching_cubes(band, level=level, progress=options["progress"])
-    require_faces(surface, level=level)
     marks.append(time.perf_counter())
-    comparison = compare(
-        mesh,
-        surface,
-        voxel_size=band.voxel_size,
-        tolerance=VOXEL_SHARE * band.voxel_size,
-        progress=options["progress"],
-    )
+    comparison = None
+    if surface.n_faces:
+        comparison = compare(
+            mesh,
+            surface,
+            voxel_size=band.voxel_size,
+            tolerance=VOXEL_SHARE * band.voxel_size,
+            progress=options["progress"],
+        )
+    else:
+        warnings += ("nothing came back: no node is inside, the mesh is thinner than a voxel",)
     marks.append(time.perf_counter())
     spent = np.round(np.diff(marks), 4).tolist()
     seconds = dict(zip(("distance", "surface", "compare"), spent, strict=True))

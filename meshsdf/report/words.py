@@ -22,7 +22,7 @@ def roundtrip_table(trip: RoundTrip) -> str:
     """Return one line per resolution, and the order of the error if there are several."""
     lines = ["".join(f"{head:>{width}}" for head, width in zip(HEADS, WIDTHS, strict=True))]
     lines += [
-        "".join(f"{cell:>{width}}" for cell, width in zip(_cells(row), WIDTHS, strict=True))
+        "".join(f"{cell:>{width}}" for cell, width in zip(_cells(row), WIDTHS, strict=False))
         for row in trip.rows
     ]
     if trip.order is not None:
@@ -32,6 +32,8 @@ def roundtrip_table(trip: RoundTrip) -> str:
 
 def _cells(row: RoundTripRow) -> tuple[str, ...]:
     found = row.comparison
+    if found is None:
+        return f"{row.resolution:g}", f"{row.voxel_size:.4g}", "nothing came back"
     lower, upper = found.distance.lower, found.distance.upper
     before, after = found.before, found.after
     volume = "-"
