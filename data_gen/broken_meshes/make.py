@@ -138,9 +138,12 @@ def seams(random: np.random.Generator) -> dict[str, Broken]:
     """Index meshes that are open where space is closed, and the other way round."""
     box = cube()
     tees = box
-    for a, b in UPRIGHT:
+    for a, b in UPRIGHT[1:]:
         tees = split_side(tees, a, b, [0.5])
-    tees = split_side(split_side(tees, 0, 4, [0.25, 0.75]), 4, 0, [0.5])
+    tees = split_side(split_side(tees, 0, 1, [0.25, 0.75]), 1, 0, [0.5])
+    starred = pierced(box, [0.5, 0.25, 0.25])
+    place = starred.vertices[8]  # in the face x = 0, away from its rims in y alone
+    beside = [place[0], np.nextafter(place[1], 0), place[2]]
     ball = sphere(2)
     (face,) = apart(ball, 1, random=random)
     corner = ball.vertices[ball.faces[face, 0]]
@@ -154,10 +157,10 @@ def seams(random: np.random.Generator) -> dict[str, Broken]:
         "t_junctions": Broken(
             tees,
             [
-                "four sides of a cube end in a vertex on one face and run through on the other",
+                "three sides of a cube are cut in the middle on one face and whole on the other",
                 "one side is cut at 1/4 and 3/4 on one face and at 1/2 on the other",
             ],
-            {"two_set_by_index": False, "n_tjunction_edges": 4 * 3 + 5},
+            {"two_set_by_index": False, "n_tjunction_edges": 3 * 3 + 5},
             ".obj",
         ),
         "unwelded": Broken(
@@ -167,13 +170,13 @@ def seams(random: np.random.Generator) -> dict[str, Broken]:
             ".stl",
         ),
         "crack_one_ulp": Broken(
-            torn(ball, [(face, 0)], [[np.nextafter(corner[0], 9), *corner[1:]]]),
-            ["one corner of one face is one unit in the last place beside its vertex"],
+            torn(starred, [(0, 2)], [beside]),
+            ["a corner of a face of a cube is one unit in the last place beside its vertex"],
             OPEN | crack,
         ),
         "crack_1e-6": Broken(
             torn(ball, [(face, 0)], [corner + 1e-6 * ball.triangles[face].mean(axis=0)]),
-            ["one corner of one face is about 1e-6 beside its vertex"],
+            ["a corner of a face of a sphere is about 1e-6 beside its vertex"],
             OPEN | crack,
         ),
         "crack_ring": Broken(

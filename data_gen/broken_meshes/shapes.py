@@ -41,7 +41,8 @@ def cube(corner=(0.0, 0.0, 0.0)) -> Mesh:
 
 def bowed_tube(*, n_along: int = 120, n_around: int = 12) -> Mesh:
     """A tube along a flat figure 8, which runs through itself at the crossing."""
-    t = 2 * np.pi * np.arange(n_along) / n_along
+    # Half a step keeps the two rings at the crossing from sharing vertices.
+    t = 2 * np.pi * (np.arange(n_along) + 0.5) / n_along
     curve = np.column_stack([2 * np.sin(t), np.sin(2 * t), 0 * t])
     along = np.column_stack([2 * np.cos(t), 2 * np.cos(2 * t), 0 * t])
     return rounded(closed_tube(curve, along, radius=0.2, n_around=n_around))

@@ -17,18 +17,16 @@ def command(mesh: str, as_json: bool) -> int:
     """
     console = Console("check", as_json=as_json)
     console.watch_compilation()
-    from ..io import read_mesh
+    from ..io import check_input, read_mesh
     from ..mesh.two_set import check
 
-    warnings: list[str] = []
+    check_input(mesh, kind="mesh")
     with console.stage("load"):
-        loaded = read_mesh(mesh, warn=warnings.append)
+        loaded = read_mesh(mesh, warn=console.warn)
     with console.stage("check"):
         report = check(loaded, progress=console.progress)
-    console.close()
-    for warning in warnings:
-        console.say(f"warning: {warning}")
     console.result(f"{mesh}: {report.describe()}")
     seconds = console.timings("load", "check")
-    console.json({"input": mesh} | report.to_json() | {"seconds": seconds})
+    tail = {"warnings": console.warnings, "seconds": seconds}
+    console.json({"input": mesh} | report.to_json() | tail)
     return YES if report.two_set else NO

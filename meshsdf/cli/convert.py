@@ -55,14 +55,14 @@ def command(
         resolution = 128
     console = Console("convert", as_json=as_json)
     console.watch_compilation()
-    from ..io import check_output, read_mesh, write_volume
+    from ..io import check_input, check_output, read_mesh, write_volume
     from ..mesh.two_set import check
     from ..sdf import choose_sign, mesh_to_band, mesh_to_grid, resolve_voxel_size
 
+    check_input(mesh, kind="mesh")
     check_output(out, kind="volume", force=force)
-    warnings: list[str] = []
     with console.stage("load"):
-        loaded = read_mesh(mesh, warn=warnings.append)
+        loaded = read_mesh(mesh, warn=console.warn)
     with console.stage("check"):
         report = check(loaded, self_intersections=False)
         size = resolve_voxel_size(loaded, resolution, voxel_size)
@@ -82,13 +82,11 @@ def command(
         volume = mesh_to_band(loaded, closest=closest, **options)
     with console.stage("write"):
         write_volume(out, volume, half=half, force=force)
-    console.close()
 
-    warnings += choice.warnings
+    for warning in choice.warnings:
+        console.warn(warning)
     if volume.sign != choice.method:
-        warnings.append("no node is inside, so distances are unsigned")
-    for warning in warnings:
-        console.say(f"warning: {warning}")
+        console.warn("no node is inside, so distances are unsigned")
     facts = volume.facts()
     seconds = console.timings("load", "check", "bricks", "distance", "far field", "sign", "write")
     seconds["distance"] += seconds.pop("bricks") + seconds.pop("far field")
@@ -97,7 +95,7 @@ def command(
         {"input": mesh, "output": out, "bytes": os.path.getsize(out)}
         | facts
         | {"sign": volume.sign, "sign_reason": choice.reason}
-        | {"seconds": seconds, "warnings": warnings}
+        | {"seconds": seconds, "warnings": console.warnings}
     )
     return YES
 

@@ -14,8 +14,9 @@ from .options import json_option, path
 def command(file: str, as_json: bool) -> int:
     """What is in FILE, a mesh or a volume. Volumes are described from their headers."""
     console = Console("info", as_json=as_json)
-    from ..io import kind_of, probe_volume
+    from ..io import check_input, kind_of, probe_volume
 
+    check_input(file)
     if kind_of(file) == "volume":
         facts = probe_volume(file)
         console.result(_volume_words(file, facts))
@@ -23,8 +24,8 @@ def command(file: str, as_json: bool) -> int:
         return YES
     from ..io import read_mesh
 
-    warnings: list[str] = []
-    loaded = read_mesh(file, warn=warnings.append)
+    with console.stage("load"):
+        loaded = read_mesh(file, warn=console.warn)
     box = loaded.box
     facts = {
         "kind": "mesh",
@@ -37,11 +38,9 @@ def command(file: str, as_json: bool) -> int:
         "materials": [material.name for material in loaded.materials],
         "n_images": sum(material.image is not None for material in loaded.materials),
     }
-    for warning in warnings:
-        console.say(f"warning: {warning}")
     console.result(_mesh_words(file, facts))
     head = {"input": file, "bytes": os.path.getsize(file)}
-    console.json(head | facts | {"warnings": warnings})
+    console.json(head | facts | {"warnings": console.warnings})
     return YES
 
 
@@ -66,6 +65,17 @@ def _mesh_words(file: str, facts: dict) -> str:
 
 
 def _volume_words(file: str, facts: dict) -> str:
-    lines = [f"{file}: {facts['kind']}, {file_size(os.path.getsize(file))}"]
-    lines += [f"  {key}: {value}" for key, value in facts.items() if key != "kind"]
+    kind = facts["kind"].replace("_", " ")
+    lines = [f"{file}: {kind}, {file_size(os.path.getsize(file))}"]
+    for key, value in facts.items():
+        if key != "kind":
+            lines.append(f"  {key.replace('_', ' ')}: {_plain(value)}")
     return "\n".join(lines)
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(_plain(item) for item in value)
+    return f"{value:.9g}" if isinstance(value, float) else str(value)

@@ -4,13 +4,14 @@ Exit codes: 0 done, the answer is yes; 1 done, the answer is no; 2 misuse; 3 the
 used or would not fit in memory; 130 interrupted.
 """
 
-import os
 import sys
-from importlib import import_module, metadata
+import traceback
+from importlib import import_module
+from pathlib import Path
 
 import click
 
-from ..errors import MeshsdfError
+from ..errors import MemoryLimitError, MeshsdfError
 from .console import INTERRUPTED, UNUSABLE
 
 COMMANDS = {
@@ -35,6 +36,12 @@ class LazyGroup(click.Group):
             return None
         return import_module(f".{name}", __package__).command
 
+    def resolve_command(self, ctx: click.Context, args: list[str]):
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-"):
+            raise click.UsageError(f"there is no command {name!r}{_hint(name)}", ctx)
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
@@ -45,7 +52,7 @@ class LazyGroup(click.Group):
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="Example: meshsdf convert bunny.obj bunny.npz --resolution 256",
 )
-@click.version_option(metadata.version("meshsdf"), prog_name="meshsdf")
+@click.version_option(package_name="meshsdf", prog_name="meshsdf")
 def group() -> None:
     """Polygon meshes to exact signed distance volumes and back, with the loss proved."""
 
@@ -53,34 +60,58 @@ def group() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code."""
     try:
-        code = group.main(args=arguments, prog_name="meshsdf", standalone_mode=False)
-        sys.stdout.flush()
-        return code or 0
+        return group.main(args=arguments, prog_name="meshsdf", standalone_mode=False) or 0
     except click.exceptions.Exit as stop:
         return stop.exit_code
     except click.ClickException as error:
         error.show()
         return error.exit_code
     except MeshsdfError as error:
-        click.echo(f"{type(error).__name__}: {error}", err=True)
-        return UNUSABLE
+        return _refuse(error)
     except MemoryError:
-        click.echo(
-            "MemoryLimitError: the system gave no more memory\n"
-            "  where: this command\n"
-            "  fix:   lower the resolution, or set --max-memory to be told beforehand",
-            err=True,
-        )
-        return UNUSABLE
+        fix = "lower the resolution, or set --max-memory to be told beforehand"
+        return _refuse(MemoryLimitError("the system gave no more memory", "this command", fix))
     except (KeyboardInterrupt, click.Abort):
         click.echo("interrupted; nothing is left half written", err=True)
         return INTERRUPTED
-    except BrokenPipeError:
-        # The reader of our output went away; keep the interpreter from complaining at exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except Exception as error:  # noqa: BLE001 (a fault of ours must not look like the answer "no")
+        return _refuse(UnexpectedError(*_fault(error)))
 
 
 def main() -> None:
     """Entry point of the console script."""
+    if sys.stdout is not None:
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be any bytes
     sys.exit(run(sys.argv[1:]))
+
+
+class UnexpectedError(MeshsdfError):
+    """A fault of the program."""
+
+
+def _refuse(error: MeshsdfError) -> int:
+    click.echo(f"{type(error).__name__}: {error}", err=True)
+    return UNUSABLE
+
+
+def _fault(error: Exception) -> tuple[str, str, str]:
+    """What, where and how to go on, for an exception that nobody foresaw."""
+    package = Path(__file__).parents[1]
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if package in Path(frame.filename).parents]
+    place = f"{Path(own[-1].filename).relative_to(package)}, line {own[-1].lineno}"
+    words = " ".join(str(error).split())[:300]
+    what = f"{type(error).__name__}: {words}" if words else type(error).__name__
+    return what, place, "this is a fault of meshsdf: report it with this text and the input"
+
+
+def _hint(name: str) -> str:
+    """How a wrong command may have been meant."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, COMMANDS, n=1)
+    if near:
+        return f"; did you mean {near[0]!r}?"
+    if "." in name:
+        return f"; to look at a file, write: meshsdf info {name}"
+    return f"; there are {', '.join(COMMANDS)}"

@@ -3,7 +3,7 @@
 import click
 
 from .console import YES, Console, plural
-from .options import force_option, json_option, path
+from .options import Number, force_option, json_option, path
 
 
 @click.command(epilog="Example: meshsdf mesh bunny.npz bunny.ply")
@@ -17,7 +17,9 @@ from .options import force_option, json_option, path
     help="How the surface is extracted.",
 )
 @click.option(
-    "--level", type=float, help="Distance of the surface.  [default: 0; unsigned: one voxel]"
+    "--level",
+    type=Number(),
+    help="Distance of the surface, world units.  [default: 0; unsigned: one voxel]",
 )
 @click.option(
     "--border",
@@ -34,21 +36,22 @@ def command(
     """Extract the surface of VOLUME as a closed, oriented, manifold mesh, OUT."""
     console = Console("mesh", as_json=as_json)
     console.watch_compilation()
-    from ..io import check_output, read_volume, write_mesh
+    from ..io import check_input, check_output, read_volume, write_mesh
     from ..mesh.measures import euler_number, is_watertight
     from ..surface import default_level, marching_cubes, require_faces
 
+    check_input(volume, kind="volume")
     check_output(out, kind="mesh", force=force)
     with console.stage("load"):
         loaded = read_volume(volume)
-    level, warnings = default_level(loaded) if level is None else (level, ())
+    if level is None:
+        level, warnings = default_level(loaded)
+        for warning in warnings:
+            console.warn(warning)
     surface = marching_cubes(loaded, level=level, border=border, progress=console.progress)
     require_faces(surface, level=level)
     with console.stage("write"):
         write_mesh(out, surface, force=force)
-    console.close()
-    for warning in warnings:
-        console.say(f"warning: {warning}")
     facts = {
         "n_vertices": surface.n_vertices,
         "n_faces": surface.n_faces,
@@ -63,5 +66,5 @@ def command(
         f"Euler number {facts['euler_number']}, {seconds['total']:.2f} s"
     )
     head = {"input": volume, "output": out, "method": method, "level": level}
-    console.json(head | facts | {"seconds": seconds, "warnings": list(warnings)})
+    console.json(head | facts | {"seconds": seconds, "warnings": console.warnings})
     return YES

@@ -8,8 +8,8 @@ import click
 UNITS = {"": 1, "k": 1e3, "m": 1e6, "g": 1e9, "t": 1e12}
 
 
-class PositiveNumber(click.ParamType):
-    """A finite number above zero."""
+class Number(click.ParamType):
+    """A finite number."""
 
     name = "number"
 
@@ -18,7 +18,17 @@ class PositiveNumber(click.ParamType):
             number = float(value)
         except ValueError:
             self.fail(f"{value!r} is not a number", param, ctx)
-        if not (math.isfinite(number) and number > 0):
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number", param, ctx)
+        return number
+
+
+class PositiveNumber(Number):
+    """A finite number above zero."""
+
+    def convert(self, value, param, ctx):
+        number = super().convert(value, param, ctx)
+        if number <= 0:
             self.fail(f"{value} is not above 0", param, ctx)
         return number
 
@@ -31,7 +41,10 @@ class Resolutions(click.ParamType):
     def convert(self, value, param, ctx):
         if isinstance(value, tuple):
             return value
-        return tuple(PositiveNumber().convert(part, param, ctx) for part in value.split(","))
+        parts = value.split(",")
+        if not all(part.strip() for part in parts):
+            self.fail(f"{value!r} lacks a number; write 64 or 64,128,256", param, ctx)
+        return tuple(PositiveNumber().convert(part, param, ctx) for part in parts)
 
 
 class Bytes(click.ParamType):
@@ -57,7 +70,13 @@ class Length(click.ParamType):
         if isinstance(value, tuple):
             return value
         in_voxels = value.endswith("vox")
-        return PositiveNumber().convert(value.removesuffix("vox"), param, ctx), in_voxels
+        number = value.removesuffix("vox")
+        try:
+            float(number)
+        except ValueError:
+            text = f"{value!r} is no length; write 0.01 (world units) or 0.5vox (voxels)"
+            self.fail(text, param, ctx)
+        return PositiveNumber().convert(number, param, ctx), in_voxels
 
 
 path = click.Path(path_type=str)
@@ -74,7 +93,7 @@ sign_option = click.option(
     type=click.Choice(["auto", "parity", "winding", "unsigned"]),
     default="auto",
     show_default=True,
-    help="How inside is told; auto asks check.",
+    help="How inside is told; auto takes what check recommends.",
 )
 half_width_option = click.option(
     "--half-width",

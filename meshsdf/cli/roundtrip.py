@@ -56,15 +56,15 @@ def command(
     """
     console = Console("roundtrip", as_json=as_json)
     console.watch_compilation()
-    from ..io import read_mesh
+    from ..io import check_input, read_mesh
     from ..mesh.two_set import check
     from ..report.roundtrip import roundtrip
     from ..report.words import roundtrip_table
     from ..sdf import choose_sign
 
-    warnings: list[str] = []
+    check_input(mesh, kind="mesh")
     with console.stage("load"):
-        loaded = read_mesh(mesh, warn=warnings.append)
+        loaded = read_mesh(mesh, warn=console.warn)
     with console.stage("check"):
         report = check(loaded, self_intersections=False)
         choice = choose_sign(report, sign)
@@ -79,9 +79,8 @@ def command(
         progress=console.progress,
     )
     rows = trip.rows
-    console.close()
-    for warning in [*warnings, *choice.warnings, *rows[-1].warnings]:
-        console.say(f"warning: {warning}")
+    for warning in [*choice.warnings, *rows[-1].warnings]:
+        console.warn(warning)
     passed = max_error is None or rows[-1].is_within(*max_error)
     console.result(f"{mesh}: sign by {choice.method} ({choice.reason})\n{roundtrip_table(trip)}")
     if not passed:
@@ -94,7 +93,7 @@ def command(
             "rows": [row.to_json() for row in rows],
             "order": trip.order,
             "passed": passed,
-            "warnings": [*warnings, *choice.warnings],
+            "warnings": console.warnings,
             "seconds": console.timings("load", "check"),
         }
     )

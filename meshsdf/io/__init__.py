@@ -8,6 +8,7 @@ from importlib import import_module
 
 _HOMES = {
     "atomic_write": "atomic",
+    "check_input": "registry",
     "check_output": "atomic",
     "kind_of": "registry",
     "make_folder": "atomic",
@@ -22,6 +23,7 @@ _HOMES = {
 
 __all__ = [
     "atomic_write",
+    "check_input",
     "check_output",
     "kind_of",
     "make_folder",

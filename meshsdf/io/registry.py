@@ -90,14 +90,28 @@ def format_of(path: str | os.PathLike, kind: Kind | None = None, task: str = "re
     what = f"a {kind or 'file'} with suffix {suffix!r} cannot be {verb}"
     if not suffix:
         what = f"the name has no suffix, so the format of the {kind or 'file'} is unknown"
+    others = [f.kind for f in FORMATS if suffix in f.suffixes and f.kind != kind]
     near = difflib.get_close_matches(suffix, known, n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]}?" if near else ""
+    hint = f"; did you mean {near[0]}?" if near and suffix not in suffixes() else ""
+    if others and kind is not None:
+        what = f"a {kind} with suffix {suffix!r} cannot be {verb}: that is a {others[0]}"
     raise IoError(what, f"file {path}", f"use one of {', '.join(known)}{hint}")
 
 
 def kind_of(path: str | os.PathLike) -> Kind:
     """Return what the suffix of ``path`` says it holds; IoError if the suffix is unknown."""
     return format_of(path).kind
+
+
+def check_input(path: str | os.PathLike, *, kind: Kind | None = None) -> None:
+    """Refuse what cannot be read, before any work starts.
+
+    Raises
+    ------
+    IoError
+        There is no such file, it is a folder or a device, or its suffix does not suit the kind.
+    """
+    format_of(checked_input(path), kind, "reader")
 
 
 def checked_input(path: str | os.PathLike) -> Path:
@@ -112,4 +126,14 @@ def checked_input(path: str | os.PathLike) -> Path:
             raise IoError("this is not a regular file", f"file {path}", "copy it to a file first")
     except (OSError, ValueError) as error:  # a name with a NUL, or too long
         raise IoError(f"no file can have this name ({error})", f"file {path}", "check it") from None
-    raise IoError("no such file", f"file {path}", "check the name and the folder")
+    raise IoError("no such file", f"file {path}", _nearest_file(path))
+
+
+def _nearest_file(path: Path) -> str:
+    """What to do about a name that does not exist: the file of that folder nearest to it."""
+    try:
+        names = os.listdir(path.parent)
+    except OSError:
+        return "check the folder"
+    near = difflib.get_close_matches(path.name, names, n=1, cutoff=0.75)
+    return f"did you mean {path.with_name(near[0])}?" if near else "check the name and the folder"

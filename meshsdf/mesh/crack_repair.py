@@ -15,13 +15,11 @@ sign is certain.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from ..arrays import Faces, Indices, Points
 from .edge_chain import residual_lines
 from .edge_table import edge_table
+from .pieces import connected_labels
 
 HALF = 0.49  # of the shortest open edge: below one half, so that no edge collapses
 ROUNDING = 10.0 ** np.arange(-15, -6)  # of the mesh's size: edges this short may collapse
@@ -56,6 +54,8 @@ def close_cracks(points: Points, faces: Faces, segments: np.ndarray) -> CrackRep
     segments : (s, 2) int
         What is left of the boundary, as vertices.
     """
+    from scipy.spatial import cKDTree  # closed meshes never come here, and need not wait for it
+
     rim = np.unique(segments)
     tree = cKDTree(points[rim])
     shortest = np.linalg.norm(points[segments[:, 0]] - points[segments[:, 1]], axis=1).min()
@@ -70,8 +70,9 @@ def close_cracks(points: Points, faces: Faces, segments: np.ndarray) -> CrackRep
 
 
 def _weld_within(
-    width: float, tree: cKDTree, rim: np.ndarray, points: np.ndarray, faces: np.ndarray
+    width: float, tree, rim: np.ndarray, points: np.ndarray, faces: np.ndarray
 ) -> CrackRepair | None:
+    """Weld rim vertices up to ``width`` apart, found by the k-d tree; None if still open."""
     pairs = tree.query_pairs(width, output_type="ndarray")
     if len(pairs) == 0:
         return None
@@ -86,8 +87,7 @@ def _weld_within(
 
 def _weld_pairs(pairs: np.ndarray, rim: np.ndarray, n_points: int) -> np.ndarray:
     """Label every vertex by the lowest of those it is linked to."""
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(rim),) * 2)
-    cluster = connected_components(links, directed=False)[1]
+    cluster = connected_labels(len(rim), pairs)
     lowest = np.full(cluster.max() + 1, n_points)
     np.minimum.at(lowest, cluster, rim)
     labels = np.arange(n_points, dtype=np.int32)

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Int32
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Faces, Points
 from .collinear import are_collinear
 from .edge_table import EdgeTable, edge_table
+from .pieces import connected_labels
 
 # Squared cosines to this axis tell lines through a vertex apart. Its components are not rational
 # multiples of each other, so different directions of a lattice rarely share one.
@@ -111,11 +110,7 @@ def residual_lines(table: EdgeTable, points: Points) -> ResidualLines:
     junction = label.reshape(-1, 2)
     n_junctions = len(leader)
     links = np.arange(len(ends)).repeat(2)
-    graph = coo_array(
-        (np.ones(len(label), dtype=np.int8), (links, len(ends) + label)),
-        shape=(len(ends) + n_junctions,) * 2,
-    )
-    _, line = connected_components(graph, directed=False)
+    line = connected_labels(len(ends) + n_junctions, np.column_stack([links, len(ends) + label]))
     _, line = np.unique(line, return_inverse=True)
     line = line.astype(np.int32)
     return ResidualLines(

@@ -6,12 +6,12 @@ Whether positions close what indices leave open is answered by the two-set check
 
 import numpy as np
 from jaxtyping import Float64
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..arrays import FaceValues
+from ..kernels.edges import connect_faces
 from .edge_table import EdgeTable, edge_table
 from .mesh import Mesh
+from .pieces import connected_labels
 from .weld import weld
 
 
@@ -74,10 +74,9 @@ def euler_number(mesh: Mesh) -> int:
 def n_components(mesh: Mesh) -> int:
     """Return the number of pieces, where faces that share an edge by index hang together."""
     table = _edges(mesh)
-    # A graph of faces and edges
-    face, side = np.nonzero(table.edge_of_corner >= 0)
-    links = np.column_stack([face, mesh.n_faces + table.edge_of_corner[face, side]])
-    return _n_pieces(mesh.n_faces + len(table.edges), links)
+    labels = np.empty(mesh.n_faces, np.int32)
+    n_pieces = connect_faces(table.edge_of_corner, len(table.edges), labels)
+    return n_pieces + int((labels < 0).sum())
 
 
 def is_watertight(mesh: Mesh) -> bool:
@@ -100,7 +99,9 @@ def n_boundary_loops(mesh: Mesh) -> int:
     """
     table = _edges(mesh)
     used, ends = np.unique(table.edges[table.n_uses == 1], return_inverse=True)
-    return _n_pieces(len(used), ends.reshape(-1, 2))
+    if len(used) == 0:
+        return 0
+    return int(connected_labels(len(used), ends.reshape(-1, 2)).max()) + 1
 
 
 def welded(mesh: Mesh) -> Mesh:
@@ -111,15 +112,6 @@ def welded(mesh: Mesh) -> Mesh:
 
 def _edges(mesh: Mesh) -> EdgeTable:
     return edge_table(mesh.faces, mesh.n_vertices)
-
-
-def _n_pieces(n_nodes: int, links: np.ndarray) -> int:
-    """Number of connected components of a graph with (l, 2) links between its nodes."""
-    if n_nodes == 0:
-        return 0
-    weights = np.ones(len(links), dtype=np.int8)
-    graph = coo_array((weights, (links[:, 0], links[:, 1])), shape=(n_nodes, n_nodes))
-    return int(connected_components(graph, directed=False, return_labels=False))
 
 
 def _edges_from_first_corner(mesh: Mesh) -> Float64[np.ndarray, "m 2 3"]:

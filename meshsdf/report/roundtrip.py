@@ -16,7 +16,7 @@ from ..sdf.sign import SignMethod
 from ..surface import default_level, marching_cubes
 from .compare import Comparison, compare
 
-VOXEL_SHARE = 1e-2
+VOXEL_SHARE = 1e-3
 """The interval of the maximum is narrowed until it is no wider than this part of a voxel."""
 
 
@@ -124,7 +124,7 @@ def roundtrip(
     Notes
     -----
     Accuracy: the Hausdorff distance is an interval that contains the truth (see `hausdorff`),
-    narrowed to a hundredth of a voxel unless that takes too many evaluations.
+    narrowed to a thousandth of a voxel unless that takes too many evaluations.
     """
     if len(resolutions) == 0:
         raise ReportError("no resolution given", "roundtrip(resolutions=...)", "give at least one")

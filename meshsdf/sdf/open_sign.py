@@ -8,7 +8,6 @@ from brick to brick through the faces on which the sign changes.
 """
 
 import numpy as np
-from scipy import ndimage
 
 from ..arrays import Number
 from ..grid import BrickIndex, NarrowBand
@@ -77,6 +76,8 @@ def _across_mixed_faces(coordinates: np.ndarray, inside: np.ndarray) -> np.ndarr
 
 def _inner_bricks(band: NarrowBand, mesh: Mesh, coordinates: np.ndarray) -> np.ndarray:
     """Missing bricks that lie inside; each connected region of them is judged once."""
+    from scipy import ndimage  # only open meshes wait for it
+
     low = coordinates.min(axis=0) - 1
     missing = np.ones(coordinates.max(axis=0) - low + 2, bool)
     missing[tuple((coordinates - low).T)] = False

@@ -7,13 +7,12 @@ neighbouring cubes always agree, and with vertices named by the integer edge the
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import SurfaceError
 from ..grid import Grid, NarrowBand
 from ..kernels.marching_cubes import count_bricks, fill_faces, fill_vertices
 from ..mesh import Mesh
+from ..mesh.pieces import connected_labels
 from ..progress import Progress, silent
 from .brick_field import BrickField, field_of_band, field_of_grid, in_ranges
 from .cap import weld_border_nodes
@@ -168,8 +167,8 @@ def _separate_fans(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray,
     # The edge runs from this corner to the next; its partner from that corner's twin to ours.
     here = corner.ravel()[has_partner]
     there = np.roll(corner, -1, axis=1).ravel()[partner[has_partner]]
-    graph = coo_array((np.ones(len(here), bool), (here, there)), shape=(faces.size, faces.size))
-    n_fans, fan = connected_components(graph, directed=False)
+    fan = connected_labels(faces.size, np.column_stack([here, there]))
+    n_fans = int(fan.max(initial=-1)) + 1
     origin = np.empty(n_fans, np.int64)
     origin[fan] = faces.ravel()
     ordered = np.lexsort((np.arange(n_fans), origin))
