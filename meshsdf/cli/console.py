@@ -20,7 +20,7 @@ BAR_AFTER = 1.0  # seconds of work before a progress bar appears
 class Console:
     """One command's run: measures its stages and shows a bar when work lasts.
 
-    The bar goes when the first result is printed, and however the command ends.
+    The bar goes before the last result is printed, and however the command ends.
 
     Attributes
     ----------
@@ -65,16 +65,25 @@ class Console:
             self.warnings.append(text)
             self.say(f"warning: {text}")
 
-    def result(self, text: str) -> None:
-        """The answer in words, on stdout unless JSON was asked for."""
-        if not self.as_json:
-            self._print(text)
+    def result(self, text: str, *, is_last: bool = True) -> None:
+        """The answer in words, on stdout unless JSON was asked for; the last ends the bar."""
+        if self.as_json:
+            return
+        if is_last:
+            self.close()
+        with self._lock:
+            if self._bar is not None:
+                self._bar.stop()
+            _print(text)
+            if self._bar is not None:
+                self._bar.start()
 
     def json(self, facts: dict) -> None:
         """The answer as one JSON object on stdout, if asked for."""
         if self.as_json:
             head = {"schema": f"meshsdf.{self.command}/1"}
-            self._print(json.dumps(head | facts, indent=2, allow_nan=False))
+            self.close()
+            _print(json.dumps(head | facts, indent=2, allow_nan=False))
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -129,16 +138,16 @@ class Console:
             bar.start()
             self._bar = bar
 
-    def _print(self, text: str) -> None:
-        self.close()
-        try:
-            click.echo(text)
-        except BrokenPipeError:
-            _discard_output()  # the reader has what it wanted; the exit code still answers
-        except OSError as error:
-            _discard_output()
-            what = f"the result cannot be printed: {error.strerror}"
-            raise IoError(what, "standard output", "send it elsewhere") from error
+
+def _print(text: str) -> None:
+    try:
+        click.echo(text)
+    except BrokenPipeError:
+        _discard_output()  # the reader has what it wanted; the exit code still answers
+    except OSError as error:
+        _discard_output()
+        what = f"the result cannot be printed: {error.strerror}"
+        raise IoError(what, "standard output", "send it elsewhere") from error
 
 
 def _discard_output() -> None:

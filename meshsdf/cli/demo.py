@@ -45,12 +45,12 @@ def command(folder: str, force: bool, as_json: bool) -> int:
     knot = trefoil_tube(n_along=480, n_around=48)
     write_mesh(out / "trefoil.ply", knot, force=force)
     report = check(knot, progress=console.progress)
-    console.result(f"trefoil.ply: {report.describe()}")
+    console.result(f"trefoil.ply: {report.describe()}", is_last=False)
     write_text(out / "check.json", json.dumps(report.to_json(), indent=2), force=force)
     band = mesh_to_band(knot, resolution=RESOLUTIONS[-1], report=report, progress=console.progress)
     write_volume(out / "trefoil.npz", band, force=force)
     trip = roundtrip(knot, RESOLUTIONS, report=report, progress=console.progress)
-    console.result(roundtrip_table(trip))
+    console.result(roundtrip_table(trip), is_last=False)
     rows = [row.to_json() for row in trip.rows]
     facts = {"rows": rows, "order": trip.order}
     write_text(out / "roundtrip.json", json.dumps(facts, indent=2), force=force)
@@ -63,7 +63,7 @@ def command(folder: str, force: bool, as_json: bool) -> int:
         pair = [("mesh", knot), (f"after {coarse.resolution:g} voxels", coarse.surface)]
         with atomic_write(out / "surfaces.png", force) as file:
             draw_surfaces(pair, file)
-    console.close()
     console.result(f"{out}: {', '.join(names)}")
-    console.json({"output": str(out), "files": names} | facts | {"seconds": console.timings()})
+    tail = {"warnings": console.warnings, "seconds": console.timings()}
+    console.json({"output": str(out), "files": names} | facts | tail)
     return YES

@@ -33,9 +33,16 @@ from .options import (
 )
 @half_width_option
 @sign_option
-@click.option("--max-error", type=Length(), help="Exit 1 if the last row's is larger; 0.01, 0.5vox")
 @click.option(
-    "--until", type=PositiveNumber(), help="Double the resolution until the error is below."
+    "--max-error",
+    type=Length(),
+    help="Exit 1 if the largest distance of the last row may exceed 0.01 (world units) or 0.5vox.",
+)
+@click.option(
+    "--until",
+    type=PositiveNumber(),
+    help="Double the last resolution until the largest distance is below, world units; "
+    "exit 1 if that cannot be.",
 )
 @max_memory_option
 @json_option
@@ -81,10 +88,10 @@ def command(
     rows = trip.rows
     for warning in [*choice.warnings, *rows[-1].warnings]:
         console.warn(warning)
-    passed = max_error is None or rows[-1].is_within(*max_error)
+    missed = _missed(rows[-1], max_error, until)
     console.result(f"{mesh}: sign by {choice.method} ({choice.reason})\n{roundtrip_table(trip)}")
-    if not passed:
-        console.say(f"the error at {rows[-1].resolution:g} may exceed --max-error")
+    for sentence in missed:
+        console.say(sentence)
     console.json(
         {
             "input": mesh,
@@ -92,9 +99,22 @@ def command(
             "sign": choice.method,
             "rows": [row.to_json() for row in rows],
             "order": trip.order,
-            "passed": passed,
+            "passed": not missed,
             "warnings": console.warnings,
             "seconds": console.timings("load", "check"),
         }
     )
-    return YES if passed else NO
+    return NO if missed else YES
+
+
+def _missed(row, max_error: tuple[float, bool] | None, until: float | None) -> list[str]:
+    """A sentence for every demand that the last row does not certainly meet."""
+    missed = []
+    if max_error is not None and not row.is_within(*max_error):
+        unit = "vox" if max_error[1] else ""
+        limit = f"--max-error {max_error[0]:g}{unit}"
+        missed.append(f"at resolution {row.resolution:g} the error may exceed {limit}")
+    if until is not None and not row.is_within(until):
+        why = "finer voxels do not help, or do not fit in memory"
+        missed.append(f"--until {until:g} is not reached at {row.resolution:g}: {why}")
+    return missed

@@ -34,6 +34,8 @@ _READ_AS_PLAIN = ("KHR_materials_", "KHR_texture_transform", "KHR_mesh_quantizat
 _NOT_APPLIED = {"KHR_texture_transform", "EXT_mesh_gpu_instancing", "skins", "targets"}
 _PUBLIC = {"_UV": "TEXCOORD_0", "_COLOR": "COLOR_0"}
 _BINARY = "its binary chunk"
+_LISTS = ("buffers", "bufferViews", "accessors", "meshes", "nodes", "scenes")
+_LISTS += ("materials", "textures", "images")
 
 
 class _Files(dict):
@@ -45,7 +47,7 @@ class _Files(dict):
     def __missing__(self, uri: str) -> bytes:
         for path in (self.folder / urllib.parse.unquote(uri), self.folder / uri):
             if path.is_file():
-                return path.read_bytes()
+                return self.setdefault(uri, path.read_bytes())
         raise ValueError(f"the file {uri[:80]!r} that it needs is missing")
 
 
@@ -58,7 +60,7 @@ def read_gltf(path: Path, warn: Warn) -> Mesh:
     if text[:4] == b"glTF":
         text, files[_BINARY] = _chunks(text)
     tree = json.loads(text.decode("utf-8-sig"))
-    primitives = _prepared(tree, files.get(_BINARY), warn)
+    primitives = _prepared(tree, files, warn)
     file = io.BytesIO(json.dumps(tree).encode())
     try:
         with warnings.catch_warnings():  # an image that makes trouble is left out by trimesh
@@ -70,10 +72,11 @@ def read_gltf(path: Path, warn: Warn) -> Mesh:
     matrices = {scene.graph.base_frame: np.eye(4)}
     for (above, name), edge in scene.graph.transforms.edge_data.items():
         matrices[name] = matrices[above] @ edge["matrix"]
-    names, nodes = list(scene.geometry), scene.graph.transforms.node_data
+    numbers = {name: number for number, name in enumerate(scene.geometry)}
+    nodes = scene.graph.transforms.node_data
     placed = []  # a frame bears the number of its node, and a suffix where that has many parts
     for frame in scene.graph.nodes_geometry:
-        number = names.index(nodes[frame]["geometry"])
+        number = numbers[nodes[frame]["geometry"]]
         placed.append((int(frame.partition("_")[0]), number, matrices[frame]))
     placed.sort(key=lambda place: place[:2])
     return _joined(tree, placed, list(scene.geometry.values()), primitives, warn)
@@ -93,25 +96,29 @@ def _chunks(data: bytes) -> tuple[bytes, bytes]:
 
 
 def _item(tree: dict, name: str, index: object) -> dict:
-    entries = tree.get(name, [])
-    if type(index) is not int or not 0 <= index < len(entries):
-        raise ValueError(f"it refers to {name}[{index!r}], but there are {len(entries)}")
-    return entries[index]
+    if type(index) is not int or not 0 <= index < len(tree[name]):
+        raise ValueError(f"it refers to {name}[{index!r}], but there are {len(tree[name])}")
+    return tree[name][index]
 
 
-def _prepared(tree: dict, binary: bytes | None, warn: Warn) -> list[dict]:
+def _size(value: object, what: str) -> int:
+    if type(value) is not int or value < 0:
+        raise ValueError(f"the {what} is {value!r}")
+    return value
+
+
+def _prepared(tree: dict, files: _Files, warn: Warn) -> list[dict]:
     """Change the document so that trimesh reads it truly; return its primitives, in order."""
     for name in tree.get("extensionsRequired", ()):
         if not str(name).startswith(_READ_AS_PLAIN):
             raise ValueError(f"it needs the extension {name}, which is not read")
-    if binary is not None and "uri" not in _item(tree, "buffers", 0):
-        tree["buffers"][0]["uri"] = _BINARY
-    for number in range(len(tree.get("accessors", ()))):
-        _check_size(tree, number)
-    primitives = [part for mesh in tree.get("meshes", ()) for part in mesh["primitives"]]
-    found = {"skins", *tree.get("extensionsUsed", ())}.difference({"skins"} - tree.keys())
-    for name in sorted(found.union(*primitives) & _NOT_APPLIED):
-        warn(f"its {name} are not applied")
+    for name in _LISTS:
+        entries = tree.setdefault(name, [])
+        if not (isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)):
+            raise ValueError(f"its {name} are not a list of objects")
+    _check_sizes(tree, files)
+    primitives = [part for mesh in tree["meshes"] for part in mesh["primitives"]]
+    found = {*tree, *tree.get("extensionsUsed", ())}.union(*primitives)
     for primitive in primitives:
         _prepare(tree, primitive)
     n_other = sum(primitive["mode"] == _POINTS for primitive in primitives)
@@ -120,39 +127,53 @@ def _prepared(tree: dict, binary: bytes | None, warn: Warn) -> list[dict]:
         raise ValueError(f"{only} no faces")
     if n_other:
         warn(f"{n_other} sets of lines or points; left out")
+    for name in sorted(found & _NOT_APPLIED):
+        warn(f"its {name} are not applied")
+    _prepare_nodes(tree)
+    return primitives
+
+
+def _prepare_nodes(tree: dict) -> None:
+    """Name the nodes by their numbers, and see to it that none is shown twice."""
     children = []
-    for number, node in enumerate(tree.get("nodes", ())):
+    for number, node in enumerate(tree["nodes"]):
         if "mesh" in node:
             _item(tree, "meshes", node["mesh"])
         children += node.get("children", ())
         node["name"] = str(number)
-        node.pop("camera", None)  # it would take the place of its children away
-    if not tree.get("scenes"):
-        roots = [number for number in range(len(tree["nodes"])) if number not in set(children)]
-        tree["scenes"] = [{"nodes": roots}]
-    shown = _item(tree, "scenes", tree.get("scene", 0)).get("nodes", [])
-    for number, count in Counter([*shown, *children]).items():
+        node.pop("camera", None)  # trimesh would drop the node with it
+    if not tree["scenes"]:
+        tree["scenes"] = [{"nodes": sorted({*range(len(tree["nodes"]))}.difference(children))}]
+    roots = _item(tree, "scenes", tree.get("scene", 0)).get("nodes", [])
+    for number, count in Counter([*roots, *children]).items():
         _item(tree, "nodes", number)
         if count > 1:
             raise ValueError(f"node {number} stands in the scene twice")
-    return primitives
 
 
-def _check_size(tree: dict, number: int) -> None:
-    """ValueError if an array reaches beyond its bytes; one without any is made empty."""
-    array = tree["accessors"][number]
-    if "sparse" in array or "bufferView" not in array:
-        tree["accessors"][number] = {"count": 0, "componentType": 5126, "type": "SCALAR"}
-        return
-    view = _item(tree, "bufferViews", array["bufferView"])
-    item = np.dtype(_TYPES[array["componentType"]]).itemsize * _WIDTHS[array["type"]]
-    sizes = [array["count"], array.get("byteOffset", 0), view.get("byteStride", item)]
-    if not all(type(size) is int and size >= 0 for size in sizes):
-        raise ValueError(f"count, offset and stride of array {number} are {sizes}")
-    end = sizes[1] + max(sizes[0] - 1, 0) * sizes[2] + item
-    if end > view["byteLength"]:
-        words = f"array {number} should end at byte {end}, but there are {view['byteLength']}"
-        raise ValueError(words)
+def _check_sizes(tree: dict, files: _Files) -> None:
+    """ValueError if a claim exceeds the bytes there are; arrays without bytes are made empty."""
+    for number, buffer in enumerate(tree["buffers"]):
+        uri = buffer.setdefault("uri", _BINARY if number == 0 and _BINARY in files else None)
+        if not isinstance(uri, str):
+            raise ValueError(f"buffer {number} has no data, but refers to {uri!r}")
+        _, is_base64, body = uri.partition("base64,")
+        there = len(body) * 3 // 4 if is_base64 else len(files[uri])
+        claim = _size(buffer["byteLength"], "length of a buffer")
+        if claim > there:
+            raise ValueError(f"buffer {number} promises {claim} bytes, but has {there}")
+    for number, array in enumerate(tree["accessors"]):
+        if "sparse" in array or "bufferView" not in array:
+            tree["accessors"][number] = {"count": 0, "componentType": 5126, "type": "SCALAR"}
+            continue
+        view = _item(tree, "bufferViews", array["bufferView"])
+        item = np.dtype(_TYPES[array["componentType"]]).itemsize * _WIDTHS[array["type"]]
+        stride = _size(view.get("byteStride", item), "stride of a view")
+        before = max(_size(array["count"], "count of an array") - 1, 0) * stride
+        end = _size(array.get("byteOffset", 0), "offset of an array") + before + item
+        there = _size(view["byteLength"], "length of a view")
+        if end > there:
+            raise ValueError(f"array {number} should end at byte {end}, but there are {there}")
 
 
 def _prepare(tree: dict, primitive: dict) -> None:
@@ -233,7 +254,7 @@ def _values(array: dict, values: np.ndarray) -> np.ndarray:
 def _materials(tree: dict, pictures: dict, warn: Warn) -> tuple[Material, ...]:
     """All materials; images are decoded for those in use, whose ``pictures`` are given."""
     materials = []
-    for index, entry in enumerate(tree.get("materials", ())):
+    for index, entry in enumerate(tree["materials"]):
         base = entry.get("pbrMetallicRoughness", {})
         # From the document, as trimesh rounds it to 8 bits.
         color = np.array(base.get("baseColorFactor", [1] * 4), np.float32)

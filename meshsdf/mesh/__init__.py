@@ -4,8 +4,20 @@ from .components import Component
 from .edge_chain import residual_edge_lines
 from .faces import degenerate_faces, net_faces, odd_faces
 from .holes import Hole
+from .measures import (
+    area,
+    euler_number,
+    face_areas,
+    face_normals,
+    is_watertight,
+    n_boundary_loops,
+    n_components,
+    volume,
+)
 from .mesh import Material, Mesh
+from .primitives import box_mesh, cylinder, icosphere, tetrahedron
 from .self_intersections import SelfIntersections, find_self_intersections
+from .tubes import closed_tube, torus, trefoil_tube
 from .two_set import check
 from .two_set_report import TwoSetReport
 from .weld import weld
@@ -17,11 +29,26 @@ __all__ = [
     "Mesh",
     "SelfIntersections",
     "TwoSetReport",
+    "area",
+    "box_mesh",
     "check",
+    "closed_tube",
+    "cylinder",
     "degenerate_faces",
+    "euler_number",
+    "face_areas",
+    "face_normals",
     "find_self_intersections",
+    "icosphere",
+    "is_watertight",
+    "n_boundary_loops",
+    "n_components",
     "net_faces",
     "odd_faces",
     "residual_edge_lines",
+    "tetrahedron",
+    "torus",
+    "trefoil_tube",
+    "volume",
     "weld",
 ]

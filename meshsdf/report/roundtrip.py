@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Number, Values
-from ..errors import ReportError
+from ..errors import MemoryLimitError, ReportError
 from ..mesh import Mesh
 from ..mesh.two_set import TwoSetReport, check
 from ..progress import Progress, silent
@@ -18,6 +18,10 @@ from .compare import Comparison, compare
 
 VOXEL_SHARE = 1e-3
 """The interval of the maximum is narrowed until it is no wider than this part of a voxel."""
+
+STUCK_SHARE = 0.8
+"""Two halvings of the voxel divide an error of first order by four; one that stays above this
+part of what it was comes from what the volume cannot hold, such as sheets within."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +115,8 @@ def roundtrip(
     sign, half_width, report, max_memory, progress
         As for `mesh_to_band`.
     until : float, optional
-        World units. Double the last resolution until the error is certainly below, or until
-        memory ends the search.
+        World units. Double the last resolution until the error is certainly below, stops
+        shrinking, or the next one would not fit in memory.
 
     Raises
     ------
@@ -137,12 +141,12 @@ def roundtrip(
         "max_memory": max_memory,
         "progress": progress,
     }
-    rows, waiting = [], list(resolutions)
-    while waiting:
-        resolution = waiting.pop(0)
-        rows.append(_row(mesh, resolution, options))
-        if not waiting and until is not None and not rows[-1].is_within(until):
-            waiting.append(2 * resolution)
+    rows = [_row(mesh, resolution, options) for resolution in resolutions]
+    while until is not None and not rows[-1].is_within(until) and not _is_stuck(rows):
+        try:
+            rows.append(_row(mesh, 2 * rows[-1].resolution, options))
+        except MemoryLimitError:
+            break
     return RoundTrip(tuple(rows))
 
 
@@ -170,6 +174,14 @@ def _row(mesh: Mesh, resolution: Number, options: dict) -> RoundTripRow:
     return RoundTripRow(
         float(resolution), band.voxel_size, comparison, surface, band.sign, warnings, seconds
     )
+
+
+def _is_stuck(rows: Sequence[RoundTripRow]) -> bool:
+    """Whether the last two refinements left the error where it was: finer voxels will not help."""
+    if len(rows) < 3 or rows[-3].comparison is None or rows[-1].comparison is None:
+        return False
+    lowest = rows[-1].comparison.distance.lower
+    return lowest > STUCK_SHARE * rows[-3].comparison.distance.upper
 
 
 def _slope(x: Values, y: Values) -> float:

@@ -5,12 +5,13 @@ import numpy as np
 from ..arrays import Number, Vector3
 from ..grid import Grid, NarrowBand
 from ..mesh import Mesh
-from ..mesh.two_set import TwoSetReport
+from ..mesh.two_set import TwoSetReport, check
 from ..progress import Progress, silent
 from ..spatial.closest_point import ClosestPoint
 from .memory import require_memory
 from .narrow_band import mesh_to_band
-from .sign import SignMethod
+from .placed_mesh import bounding_faces, weld_faces
+from .sign import SignMethod, choose_sign
 
 NODES_AT_ONCE = 1 << 20
 
@@ -36,6 +37,8 @@ def mesh_to_grid(
     Accuracy: every value is the Euclidean distance rounded to float32, near and far.
     Cost: one closest-point query per node outside the band.
     """
+    if report is None:
+        report = check(mesh, self_intersections=False)
     band = mesh_to_band(
         mesh,
         resolution=resolution,
@@ -52,7 +55,7 @@ def mesh_to_grid(
     n_nodes = float(np.prod(shape.astype(float)))
     require_memory(4 * n_nodes + 150 * NODES_AT_ONCE, max_memory, where=where)
     values = np.empty(shape, np.float32)
-    query = ClosestPoint(mesh)
+    query = ClosestPoint(_bounding_mesh(mesh, band, report))
     planes = max(1, int(NODES_AT_ONCE // np.prod(shape[1:])))
     for i in range(0, shape[0], planes):
         last = min(i + planes, shape[0])
@@ -60,6 +63,16 @@ def mesh_to_grid(
         values[i:last] = _distances(band, query, ijk).reshape(last - i, *shape[1:])
         progress("far field", last / shape[0])
     return Grid(values, band.voxel_size, band.to_world(first[None])[0], band.sign)
+
+
+def _bounding_mesh(mesh: Mesh, band: NarrowBand, report: TwoSetReport) -> Mesh:
+    """The faces that the band's distances are measured to."""
+    by_crossings = (
+        band.is_signed and choose_sign(report, band.sign, voxel_size=band.voxel_size).by_crossings
+    )
+    points, faces = weld_faces(mesh)
+    keep = bounding_faces(points, faces, cancel=band.sign if by_crossings else "unsigned")
+    return Mesh(points, faces[keep])
 
 
 def _node_box(mesh: Mesh, band: NarrowBand) -> tuple[np.ndarray, np.ndarray]:

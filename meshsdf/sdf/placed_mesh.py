@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Int32
 
-from ..arrays import FaceLabels, Faces, Points
+from ..arrays import FaceLabels, FaceMask, Faces, Points
 from ..errors import SdfError
 from ..kernels.vertex_edges import edges_of_vertices
 from ..mesh import Mesh, degenerate_faces, net_faces, odd_faces, residual_edge_lines, weld
@@ -85,17 +85,15 @@ def weld_faces(mesh: Mesh) -> tuple[Points, Faces]:
     return points, labels[mesh.faces]
 
 
-def place(points: Points, faces: Faces, lattice: Lattice, *, cancel: str) -> PlacedMesh:
-    """Keep what bounds something and express it in voxels of the lattice.
+def bounding_faces(points: Points, faces: Faces, *, cancel: str) -> FaceMask:
+    """Mark the faces that bound something.
 
     Parameters
     ----------
     points, faces
         From `weld_faces`.
-    lattice : Lattice
-        Where to place it.
     cancel : "parity", "winding" or "unsigned"
-        Which sheets to drop: those in even number, those that come with their reverse, or none.
+        Which sheets to leave out: those in even number, those that come with their reverse, none.
 
     Raises
     ------
@@ -117,6 +115,12 @@ def place(points: Points, faces: Faces, lattice: Lattice, *, cancel: str) -> Pla
             f'mesh_to_band(sign="{cancel}")',
             'pass sign="unsigned" to measure the distance to the sheets',
         )
+    return keep
+
+
+def place(points: Points, faces: Faces, lattice: Lattice, *, cancel: str) -> PlacedMesh:
+    """Express the faces that bound something in voxels of the lattice; see `bounding_faces`."""
+    keep = bounding_faces(points, faces, cancel=cancel)
     face_ids = np.flatnonzero(keep).astype(np.int32)
     faces = np.ascontiguousarray(faces[keep])
     table = edge_table(faces, len(points))

@@ -1,0 +1,94 @@
+"""meshsdf.grid: the two-level page table and the band that stands on it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+from meshsdf.errors import GridError
+from meshsdf.grid import BrickIndex, Grid, NarrowBand
+from meshsdf.grid.brick_index import INSIDE, OUTSIDE
+
+
+def some_bricks(seed: int, n: int, spread: int, offset: int = 0) -> np.ndarray:
+    """Different bricks in lexicographic order."""
+    rng = np.random.default_rng(seed)
+    return np.unique(rng.integers(-spread, spread, (n, 3)) + offset, axis=0)
+
+
+@given(
+    st.integers(0, 1000),
+    st.integers(1, 60),
+    st.sampled_from([2, 20, 200]),
+    st.sampled_from([0, -7, 10**9, -(10**9)]),
+)
+def test_lookup_gives_every_brick_its_slot_and_nothing_else(seed, n, spread, offset):
+    bricks = some_bricks(seed, n, spread, offset)
+    index = BrickIndex.from_coordinates(bricks)
+    assert_array_equal(index.lookup(bricks), np.arange(len(bricks)))
+    slot_of = {tuple(brick): slot for slot, brick in enumerate(bricks.tolist())}
+    asked = some_bricks(seed + 1, 200, 2 * spread, offset)
+    expected = [slot_of.get(tuple(brick), OUTSIDE) for brick in asked.tolist()]
+    assert_array_equal(index.lookup(asked), expected)
+
+
+def test_inner_bricks_are_inside_and_so_is_a_page_without_bricks():
+    shell = np.array([[0, 0, 0], [0, 0, 4], [40, 0, 0]])
+    inner = np.array([[0, 0, 2], [20, 3, 5]])
+    index = BrickIndex.from_coordinates(shell, inner)
+    assert_array_equal(index.lookup(inner), [INSIDE, INSIDE])
+    assert_array_equal(index.lookup(np.array([[0, 0, 1], [21, 3, 5]])), [OUTSIDE, INSIDE])
+    assert_array_equal(index.lookup(shell), [0, 1, 2])
+
+
+def test_bricks_out_of_order_or_twice_are_refused():
+    for bricks in ([[0, 0, 1], [0, 0, 0]], [[1, 2, 3], [1, 2, 3]]):
+        with pytest.raises(GridError, match=r"comes after"):
+            BrickIndex.from_coordinates(np.array(bricks))
+
+
+def test_an_empty_index_is_outside_everywhere():
+    index = BrickIndex.from_coordinates(np.empty((0, 3), np.int64))
+    assert index.n_bricks == 0
+    assert_array_equal(index.lookup(np.array([[0, 0, 0], [5, -3, 10**12]])), [OUTSIDE] * 2)
+
+
+def small_band() -> NarrowBand:
+    """Two bricks with a few active nodes of known values."""
+    index = BrickIndex.from_coordinates(np.array([[-1, 0, 0], [0, 0, 2]]), np.array([[0, 0, 1]]))
+    values = np.full((2, 8, 8, 8), 3.0, np.float32)
+    active = np.zeros((2, 8), np.uint64)
+    for slot, (i, j, k), value in ((0, (7, 1, 2), -1.5), (1, (0, 7, 7), 0.5), (1, (3, 0, 1), 0.0)):
+        values[slot, i, j, k] = value
+        active[slot, i] |= np.uint64(1) << np.uint64(8 * j + k)
+    return NarrowBand(index, values, active, 0.5, np.array([1.0, 0, 0]), 6.0, "parity")
+
+
+def test_a_band_tells_its_active_nodes_in_order():
+    band = small_band()
+    assert_array_equal(band.active_ijk(), [[-1, 1, 2], [0, 7, 23], [3, 0, 17]])
+    assert_array_equal(band.active_values(), [-1.5, 0.5, 0.0])
+    assert band.n_active == 3
+    low, high = band.active_box()
+    assert_array_equal([low, high], [[-1, 0, 2], [3, 7, 23]])
+    assert_array_equal(band.to_world(np.array([[-1, 1, 2]])), [[0.5, 0.5, 1.0]])
+
+
+def test_a_band_reads_values_anywhere():
+    ijk = np.array([[-1, 1, 2], [0, 0, 8], [0, 0, 0], [10**12, 0, 0]])
+    assert_array_equal(small_band().value_at(ijk), [-1.5, -3.0, 3.0, 3.0])
+
+
+def test_a_band_with_too_few_bricks_is_refused():
+    band = small_band()
+    short = object.__new__(NarrowBand)  # past the tests' own type check, which would be first
+    vars(short).update(vars(band) | {"values": band.values[:1]})
+    with pytest.raises(GridError, match="values holds 1 bricks, the index 2"):
+        short.__post_init__()
+
+
+def test_a_grid_needs_a_positive_voxel_size():
+    for size in (0.0, -1.0, float("nan")):
+        with pytest.raises(GridError, match="voxel_size is"):
+            Grid(np.zeros((2, 2, 2), np.float32), size, np.zeros(3))
