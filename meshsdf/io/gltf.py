@@ -67,7 +67,7 @@ def read_gltf(path: Path, warn: Warn) -> Mesh:
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             scene = trimesh.load_scene(file, file_type="gltf", resolver=files, process=False)
     except AssertionError as error:
-        raise ValueError("it is cut off: an array should end behind the last byte") from error
+        raise ValueError("it is cut off: an array ends behind the last byte") from error
     # Multiplied here: the scene's own products omit steps of 1e-8 and straighten near rotations.
     matrices = {scene.graph.base_frame: np.eye(4)}
     for (above, name), edge in scene.graph.transforms.edge_data.items():
@@ -162,6 +162,12 @@ def _check_sizes(tree: dict, files: _Files) -> None:
         claim = _size(buffer["byteLength"], "length of a buffer")
         if claim > there:
             raise ValueError(f"buffer {number} promises {claim} bytes, but has {there}")
+    for number, view in enumerate(tree["bufferViews"]):
+        there = _item(tree, "buffers", view["buffer"])["byteLength"]
+        start = _size(view.get("byteOffset", 0), "offset of a view")
+        end = start + _size(view["byteLength"], "length of a view")
+        if end > there:
+            raise ValueError(f"view {number} should end at byte {end}, but there are {there}")
     for number, array in enumerate(tree["accessors"]):
         if "sparse" in array or "bufferView" not in array:
             tree["accessors"][number] = {"count": 0, "componentType": 5126, "type": "SCALAR"}
@@ -171,8 +177,8 @@ def _check_sizes(tree: dict, files: _Files) -> None:
         stride = _size(view.get("byteStride", item), "stride of a view")
         before = max(_size(array["count"], "count of an array") - 1, 0) * stride
         end = _size(array.get("byteOffset", 0), "offset of an array") + before + item
-        there = _size(view["byteLength"], "length of a view")
-        if end > there:
+        if end > view["byteLength"]:
+            there = view["byteLength"]
             raise ValueError(f"array {number} should end at byte {end}, but there are {there}")
 
 

@@ -6,6 +6,7 @@ import struct
 import tracemalloc
 
 import numpy as np
+import PIL.Image
 import pytest
 import trimesh
 from numpy.testing import assert_allclose, assert_array_equal
@@ -81,13 +82,34 @@ def test_a_mesh_that_two_nodes_show_appears_twice(tmp_path):
     assert_array_equal(mesh.faces[4:], TETRAHEDRON_FACES + 4)
 
 
-@pytest.mark.parametrize(
-    ("mode", "expected"), [(5, [[0, 1, 2], [2, 1, 3]]), (6, [[0, 1, 2], [0, 2, 3]])]
-)
-def test_strips_and_fans_keep_their_side(tmp_path, mode, expected):
+def triangles(mode, indices=None):
+    """The four corners as a strip or a fan, with or without indices."""
     primitive = {"attributes": {"POSITION": 0}, "mode": mode}
-    mesh = read(tmp_path, document(meshes=[{"primitives": [primitive]}]))
-    assert_array_equal(mesh.faces, expected)
+    parts = document(meshes=[{"primitives": [primitive]}])
+    if indices is not None:
+        data = np.array(indices, "<u2").tobytes()
+        uri = "data:;base64," + base64.b64encode(data).decode()
+        parts["buffers"].append({"byteLength": len(data), "uri": uri})
+        parts["bufferViews"][1] = {"buffer": 1, "byteLength": len(data)}
+        parts["accessors"][1]["count"] = len(indices)
+        primitive["indices"] = 1
+    return parts
+
+
+def turned(faces):
+    """Each face from its smallest corner on."""
+    return [np.roll(face, -int(np.argmin(face))).tolist() for face in faces]
+
+
+def test_strips_keep_their_side_and_jump_without_leaving_faces(tmp_path):
+    assert turned(read(tmp_path, triangles(5)).faces) == [[0, 1, 2], [1, 3, 2]]
+    jump = [0, 1, 2, 2, 3, 3, 1, 0]  # 2 2 and 3 3 end one run and begin the next
+    assert turned(read(tmp_path, triangles(5, jump)).faces) == [[0, 1, 2], [0, 1, 3]]
+
+
+def test_fans_are_refused_rather_than_left_out(tmp_path):
+    with pytest.raises(IoError, match="triangle fans, which are not read"):
+        read(tmp_path, triangles(6))
 
 
 def test_parts_that_draw_on_the_same_arrays_keep_their_common_vertices(tmp_path):
@@ -133,26 +155,83 @@ def test_colours_are_linear_in_every_storage(tmp_path):
         assert_allclose(mesh.vertex_colors, (top // 5) / top, rtol=1e-7)
 
 
-def test_interleaved_and_sparse_accessors_are_followed(tmp_path):
+def test_interleaved_arrays_are_followed(tmp_path):
     parts = document()
     table = np.zeros(4, [("x", "<f4", 3), ("pad", "<u4")])
     table["x"] = TETRAHEDRON
-    news = np.array([9, 9, 9], "<f4").tobytes() + np.array([3], "<u2").tobytes()
-    data = table.tobytes() + news
-    uri = "data:;base64," + base64.b64encode(data).decode()
-    parts["buffers"].append({"byteLength": len(data), "uri": uri})
+    uri = "data:;base64," + base64.b64encode(table.tobytes()).decode()
+    parts["buffers"].append({"byteLength": table.nbytes, "uri": uri})
     parts["bufferViews"][0] = {"buffer": 1, "byteLength": 64, "byteStride": 16}
-    parts["bufferViews"] += [
-        {"buffer": 1, "byteOffset": 64, "byteLength": 12},
-        {"buffer": 1, "byteOffset": 76, "byteLength": 2},
+    assert_array_equal(read(tmp_path, parts).vertices, TETRAHEDRON)
+
+
+def test_sparse_arrays_are_refused_where_they_matter_and_nowhere_else(tmp_path):
+    sparse = {"count": 1, "values": {"bufferView": 0}, "indices": {"bufferView": 1}}
+    parts = document()
+    parts["accessors"].append(parts["accessors"][0] | {"sparse": sparse})
+    assert read(tmp_path, parts).n_faces == 4
+    parts["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = 2
+    with pytest.raises(IoError, match="sparse or compressed arrays, which are not read"):
+        read(tmp_path, parts)
+
+
+def test_quantized_positions_are_fractions(tmp_path):
+    parts = document(extensionsRequired=["KHR_mesh_quantization"])
+    table = np.zeros((4, 4), "<i2")
+    table[:, :3] = TETRAHEDRON * 32767
+    uri = "data:;base64," + base64.b64encode(table.tobytes()).decode()
+    parts["buffers"].append({"byteLength": table.nbytes, "uri": uri})
+    parts["bufferViews"][0] = {"buffer": 1, "byteLength": 32, "byteStride": 8}
+    parts["accessors"][0] |= {"componentType": 5122, "normalized": True}
+    assert_array_equal(read(tmp_path, parts).vertices, TETRAHEDRON)
+
+
+def test_steps_and_turns_that_are_tiny_or_nearly_rigid_are_kept(tmp_path):
+    nodes = [
+        {"children": [1], "scale": [1 + 1e-6] * 3},
+        {"children": [2], "translation": [1e-9, 0, 0]},
+        {"mesh": 0, "scale": [1e-9] * 3},
     ]
-    parts["accessors"][0]["sparse"] = {
-        "count": 1,
-        "values": {"bufferView": 2},
-        "indices": {"bufferView": 3, "componentType": 5123},
-    }
-    mesh = read(tmp_path, parts)
-    assert_array_equal(mesh.vertices, [*TETRAHEDRON[:3], [9, 9, 9]])
+    vertices = read(tmp_path, document(nodes=nodes)).vertices
+    assert_allclose(vertices, (1 + 1e-6) * (TETRAHEDRON * 1e-9 + [1e-9, 0, 0]), rtol=1e-15)
+
+
+def test_cameras_and_lines_do_not_take_the_place_of_their_children_away(tmp_path):
+    parts = document(cameras=[{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}])
+    parts["meshes"].append({"primitives": [{"attributes": {"POSITION": 0}, "mode": 2}]})
+    parts["nodes"] = [
+        {"camera": 0, "children": [1], "translation": [1, 0, 0]},
+        {"mesh": 1, "children": [2], "translation": [2, 0, 0]},
+        {"mesh": 0},
+    ]
+    assert_array_equal(read(tmp_path, parts).vertices, np.add(TETRAHEDRON, [3, 0, 0]))
+
+
+def test_what_is_not_applied_is_said(tmp_path):
+    notes = []
+    read(
+        tmp_path, document(skins=[{"joints": [0]}], extensionsUsed=["KHR_texture_transform"]), notes
+    )
+    assert notes == ["its KHR_texture_transform are not applied", "its skins are not applied"]
+
+
+def test_uv_need_no_material_and_come_from_the_set_that_the_image_uses(tmp_path):
+    uv = np.arange(16, dtype="<u2").reshape(2, 4, 2) * 4369  # fifteenths of 65535
+    uri = "data:;base64," + base64.b64encode(uv.tobytes()).decode()
+    parts = document(materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"texCoord": 1}}}])
+    parts["buffers"].append({"byteLength": 32, "uri": uri})
+    parts["bufferViews"].append({"buffer": 1, "byteLength": 32})
+    array = {"bufferView": 2, "componentType": 5123, "type": "VEC2", "normalized": True, "count": 4}
+    parts["accessors"] += [array, array | {"byteOffset": 16}]
+    primitive = parts["meshes"][0]["primitives"][0]
+    primitive["attributes"] |= {"TEXCOORD_0": 2, "TEXCOORD_1": 3}
+    plain = uv / 65535
+    plain[:, :, 1] = 1 - plain[:, :, 1]  # glTF counts from the top
+    assert_allclose(read(tmp_path, parts).uv, plain[0], rtol=1e-15)
+    parts |= {"textures": [{"source": 0}], "images": [{"uri": "none.png"}]}
+    parts["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 0
+    primitive["material"] = 0
+    assert_allclose(read(tmp_path, parts).uv, plain[1], rtol=1e-15)
 
 
 def test_buffers_and_images_beside_the_file_are_found_by_their_escaped_names(tmp_path):
@@ -165,7 +244,16 @@ def test_buffers_and_images_beside_the_file_are_found_by_their_escaped_names(tmp
     mesh = read(tmp_path, parts, notes)
     assert mesh.n_faces == 4
     assert mesh.materials[0].image is None
-    assert notes == ["image 0 is missing: the file 'no%20such.png' that it needs is missing"]
+    assert notes == ["image 0 'no%20such.png' is missing or cannot be read"]
+    assert (mesh.materials[0].image_name, mesh.material_index.tolist()) == (
+        "no%20such.png",
+        [0] * 4,
+    )
+    pixels = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
+    PIL.Image.fromarray(pixels).save(tmp_path / "no such.png")
+    notes.clear()
+    assert_array_equal(read(tmp_path, parts, notes).materials[0].image, pixels)
+    assert notes == []
     (tmp_path / "my data.bin").unlink()
     with pytest.raises(IoError, match=r"'my%20data\.bin' that it needs is missing"):
         read(tmp_path, parts)
@@ -182,27 +270,31 @@ def changed(path, value):
 
 BAD = [
     (("accessors", 0, "count"), 10**12, "should end at byte"),
-    (("accessors", 0, "count"), -1, "count of an accessor is -1"),
+    (("accessors", 0, "count"), -1, "count of an array is -1"),
     (("accessors", 0, "byteOffset"), 40, "should end at byte 88, but there are 48"),
     (("accessors", 1, "count"), 11, "11 corners, not 3 for each"),
-    (("accessors", 0), {"componentType": 5126, "count": 10**12, "type": "VEC3"}, "no bytes stand"),
-    (("bufferViews", 0, "byteLength"), 10**12, "should end at byte"),
+    (
+        ("accessors", 0),
+        {"componentType": 5126, "count": 10**12, "type": "VEC3"},
+        "sparse or compressed arrays",
+    ),
+    (("bufferViews", 0, "byteLength"), 10**12, "view 0 should end at byte 1000000000000"),
     (("bufferViews", 0, "byteStride"), 10**12, "should end at byte"),
     (("buffers", 0, "byteLength"), 10**12, "promises 1000000000000 bytes, but has 72"),
     (("buffers", 0), {"byteLength": 72}, "buffer 0 has no data"),
-    (("buffers", 0, "uri"), "data:;base64,!", "GLTF"),
+    (("buffers", 0, "uri"), "data:;base64,!", "promises 72 bytes, but has 0"),
     (("nodes", 0, "children"), [0], "node 0 stands in the scene twice"),
     (("nodes", 0, "mesh"), 3, r"meshes\[3\], but there are 1"),
     (("nodes", 0, "matrix"), [1, 2], "GLTF"),
-    (("nodes", 0, "scale"), [1, None, 1], "NaN or infinite"),
+    (("nodes", 0, "scale"), [1, None, 1], "NoneType"),
     (("scenes", 0, "nodes"), ["x"], r"nodes\['x'\]"),
-    (("asset", "version"), "1.0", "version 1.0; only 2"),
+    (("asset", "version"), "1.0", "only GLTF 2 is supported"),
     (("extensionsRequired",), ["KHR_draco_mesh_compression"], "KHR_draco_mesh_compression"),
-    (("meshes",), 7, "its meshes are not a list"),
-    (("nodes", 0), 7, r"its nodes\[0\] is not an object"),
-    (("buffers", 0, "uri"), 7, "refers to the file 7"),
+    (("meshes",), 7, "its meshes are not a list of objects"),
+    (("nodes", 0), 7, "its nodes are not a list of objects"),
+    (("buffers", 0, "uri"), 7, "buffer 0 has no data, but refers to 7"),
     (("buffers", 0, "byteLength"), None, "length of a buffer is None"),
-    (("bufferViews", 0, "byteLength"), "x", "length of buffer view 0 is 'x'"),
+    (("bufferViews", 0, "byteLength"), "x", "length of a view is 'x'"),
     (("meshes", 0, "primitives", 0, "material"), 0, r"materials\[0\], but there are 0"),
     (("meshes", 0, "primitives", 0, "attributes"), {}, "POSITION"),
 ]
@@ -248,7 +340,7 @@ def test_a_glb_that_lies_about_its_length_is_refused(tmp_path):
         glb(length=2**32 - 1)
     with pytest.raises(IoError, match="GLB version 1"):
         glb(version=1)
-    with pytest.raises(IoError, match="a chunk should end at byte"):
+    with pytest.raises(IoError, match="promises 4294967315 bytes"):
         glb(body=struct.pack("<I4s", 2**32 - 1, b"JSON") + text)
     with pytest.raises(IoError, match="no JSON chunk"):
         glb(body=struct.pack("<I4s", len(text), b"JUNK") + text)

@@ -1,0 +1,7 @@
+"""What all tests share: examples of Hypothesis are the same in every run and may take their time."""
+
+from hypothesis import settings
+
+# No deadline: the first example of a test may compile kernels
+settings.register_profile("meshsdf", deadline=None, derandomize=True, database=None)
+settings.load_profile("meshsdf")
