@@ -7,11 +7,13 @@ it rounds colours to 8 bits and drops uv without a material.
 Notes
 -----
 Refused: triangle fans, sparse and compressed arrays. Left out and said: lines, points, skins,
-morph targets, instances, texture transforms. Materials in the older specular-glossiness form are
-white. Parts stand in the order of their nodes in the file.
+morph targets, instances, texture transforms, and materials in the older specular-glossiness form,
+which become white. Parts stand in the order of their nodes in the file. The first call imports
+trimesh, about half a second.
 """
 
 import io
+import itertools
 import json
 import struct
 import urllib.parse
@@ -32,6 +34,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "
 _TYPES = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
 _READ_AS_PLAIN = ("KHR_materials_", "KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_")
 _NOT_APPLIED = {"KHR_texture_transform", "EXT_mesh_gpu_instancing", "skins", "targets"}
+_NOT_APPLIED |= {"KHR_materials_pbrSpecularGlossiness"}
 _PUBLIC = {"_UV": "TEXCOORD_0", "_COLOR": "COLOR_0"}
 _BINARY = "its binary chunk"
 _LISTS = ("buffers", "bufferViews", "accessors", "meshes", "nodes", "scenes")
@@ -61,7 +64,10 @@ def read_gltf(path: Path, warn: Warn) -> Mesh:
         text, files[_BINARY] = _chunks(text)
     tree = json.loads(text.decode("utf-8-sig"))
     primitives = _prepared(tree, files, warn)
-    file = io.BytesIO(json.dumps(tree).encode())
+    # Of materials trimesh needs the image alone; it rounds base colours and mixes others in.
+    bases = [entry.get("pbrMetallicRoughness", {}) for entry in tree["materials"]]
+    pictured = [{"baseColorTexture": base.get("baseColorTexture")} for base in bases]
+    file = io.BytesIO(json.dumps(tree | {"materials": pictured}).encode())
     try:
         with warnings.catch_warnings():  # an image that makes trouble is left out by trimesh
             warnings.simplefilter("error", Image.DecompressionBombWarning)
@@ -72,14 +78,16 @@ def read_gltf(path: Path, warn: Warn) -> Mesh:
     matrices = {scene.graph.base_frame: np.eye(4)}
     for (above, name), edge in scene.graph.transforms.edge_data.items():
         matrices[name] = matrices[above] @ edge["matrix"]
-    numbers = {name: number for number, name in enumerate(scene.geometry)}
-    nodes = scene.graph.transforms.node_data
-    placed = []  # a frame bears the number of its node, and a suffix where that has many parts
-    for frame in scene.graph.nodes_geometry:
-        number = numbers[nodes[frame]["geometry"]]
-        placed.append((int(frame.partition("_")[0]), number, matrices[frame]))
-    placed.sort(key=lambda place: place[:2])
-    return _joined(tree, placed, list(scene.geometry.values()), primitives, warn)
+    parts = zip(scene.geometry.values(), primitives, strict=True)
+    parts = [list(itertools.islice(parts, len(mesh["primitives"]))) for mesh in tree["meshes"]]
+    # Placed by the document: trimesh names the many parts of a mesh by chance, and some alike.
+    placed = [
+        (number, matrices[str(number)], *part)
+        for number, node in enumerate(tree["nodes"])
+        if "mesh" in node and str(number) in matrices
+        for part in parts[node["mesh"]]
+    ]
+    return _joined(tree, placed, warn)
 
 
 def _chunks(data: bytes) -> tuple[bytes, bytes]:
@@ -188,7 +196,7 @@ def _prepare(tree: dict, primitive: dict) -> None:
     if mode == _FAN:
         raise ValueError("it holds triangle fans, which are not read")
     primitive["mode"] = mode if mode in (_TRIANGLES, _STRIP) else _POINTS
-    names = {"_COLOR": "COLOR_0", "_UV": "TEXCOORD_0"}
+    names = dict(_PUBLIC)
     if "material" in primitive:
         material = _item(tree, "materials", primitive["material"])
         texture = material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
@@ -208,12 +216,11 @@ def _prepare(tree: dict, primitive: dict) -> None:
         raise ValueError(f"a list of triangles has {max(corners)} corners, not 3 for each")
 
 
-def _joined(tree: dict, placed: list, parts: list, primitives: list[dict], warn: Warn) -> Mesh:
+def _joined(tree: dict, placed: list[tuple], warn: Warn) -> Mesh:
     """One mesh of all parts; those of one node that draw on the same arrays share vertices."""
     first, n_vertices, has, pictures = {}, 0, set(), {}
     vertices, faces, uv, colors, material_index = [], [], [], [], []
-    for node, number, matrix in placed:
-        part, primitive = parts[number], primitives[number]
+    for node, matrix, part, primitive in placed:
         if primitive["mode"] == _POINTS:
             continue
         source = (node, *sorted(primitive["attributes"].items()))
@@ -262,7 +269,6 @@ def _materials(tree: dict, pictures: dict, warn: Warn) -> tuple[Material, ...]:
     materials = []
     for index, entry in enumerate(tree["materials"]):
         base = entry.get("pbrMetallicRoughness", {})
-        # From the document, as trimesh rounds it to 8 bits.
         color = np.array(base.get("baseColorFactor", [1] * 4), np.float32)
         if color.shape != (4,) or not np.isfinite(color).all():
             raise ValueError(f"the base colour of material {index} is {color.tolist()}")
