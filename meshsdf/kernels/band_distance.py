@@ -98,6 +98,8 @@ def scan_edges(
         a, b = points[ends[e, 0]], points[ends[e, 1]]
         ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
         length = np.sqrt(ux * ux + uy * uy + uz * uz)
+        if length == 0.0:
+            continue  # its ends differ by less than rounding, and are scanned as vertices
         ux, uy, uz = ux / length, uy / length, uz / length
         # Directions from the edge into its faces
         f = faces.shape[0]
@@ -215,7 +217,10 @@ def scan_vertices(
                 continue
             q = points[ends[e, 0] + ends[e, 1] - v]
             dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-            scale = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz)
+            length = np.sqrt(dx * dx + dy * dy + dz * dz)
+            if length == 0.0:
+                continue
+            scale = 1.0 / length
             away[n_away, 0], away[n_away, 1], away[n_away, 2] = dx * scale, dy * scale, dz * scale
             n_away += 1
         x_first = max(x0, np.int64(np.ceil(p[0] - reach)))

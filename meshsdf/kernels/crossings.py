@@ -45,38 +45,37 @@ def count_crossings(
         f = ids[n]
         v = faces[f]
         a, b, c = points[v[0]], points[v[1]], points[v[2]]
-        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        wx, wy, wz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        z_min, z_max = min(a[2], b[2], c[2]), max(a[2], b[2], c[2])
-        slope_x = -nx / nz if nz != 0.0 else 0.0
-        slope_y = -ny / nz if nz != 0.0 else 0.0
         x_first = max(x0, np.int64(np.ceil(min(a[0], b[0], c[0]))))
         x_last = min(x1 - 1, np.int64(np.ceil(max(a[0], b[0], c[0]))) - 1)
         for x in range(x_first, x_last + 1):
             # A face has two edges that pass line x, one up and one down, or none
-            y_up, y_down, n_up = 0.0, 0.0, 0
+            y_up, y_down, z_up, z_down, n_up = 0.0, 0.0, 0.0, 0.0, 0
             for e in range(3):
                 vp, vq = v[e], v[(e + 1) % 3]
-                y, way = _edge_height(points[vp], points[vq], vp, vq, x)
-                if way != 0 and len(edge_line) > 0 and edge_line[f, e] >= 0:
+                p, q = points[vp], points[vq]
+                y, way = _edge_height(p, q, vp, vq, x)
+                if way == 0:
+                    continue
+                if len(edge_line) > 0 and edge_line[f, e] >= 0:
                     line = line_ends[edge_line[f, e]]
                     y, _ = _edge_height(points[line[0]], points[line[1]], line[0], line[1], x)
+                z = p[2] + (q[2] - p[2]) * ((x - p[0]) / (q[0] - p[0]))
                 if way > 0:
-                    y_up, n_up = y, n_up + 1
-                elif way < 0:
-                    y_down = y
+                    y_up, z_up, n_up = y, z, 1
+                else:
+                    y_down, z_down = y, z
             if n_up == 0:
                 continue
-            # Seen along +z: upward edges below downward ones mean the face looks up (nz > 0)
+            # Seen along +z: upward edges below downward ones mean the face looks up
             step = -1 if y_up < y_down else 1
             if not signed:
                 step = 1
             y_first = np.int64(np.ceil(min(y_up, y_down)))
             y_last = np.int64(np.ceil(max(y_up, y_down))) - 1
             for y in range(y_first, y_last + 1):
-                z = a[2] + slope_x * (x - a[0]) + slope_y * (y - a[1])
-                k = np.int64(np.ceil(min(max(z, z_min), z_max)))
+                # The face cuts the plane x in the segment between its two edges
+                z = z_up + (z_down - z_up) * ((y - y_up) / (y_down - y_up))
+                k = np.int64(np.ceil(min(max(z, min(z_up, z_down)), max(z_up, z_down))))
                 slot = find_brick(root, pages, x >> 3, y >> 3, k >> 3)
                 if slot >= 0:
                     node = ((x & 7) << 6) | ((y & 7) << 3) | (k & 7)

@@ -12,6 +12,7 @@ from ..mesh import Mesh
 from ..mesh.two_set import TwoSetReport, check
 from ..progress import Progress, silent
 from ..sdf import mesh_to_band
+from ..sdf.memory import require_memory
 from ..sdf.sign import SignMethod
 from ..surface import default_level, marching_cubes
 from .compare import Comparison, compare
@@ -22,6 +23,8 @@ VOXEL_SHARE = 1e-3
 STUCK_SHARE = 0.8
 """Two halvings of the voxel divide an error of first order by four; one that stays above this
 part of what it was comes from what the volume cannot hold, such as sheets within."""
+
+BYTES_PER_FACE = 500  # trees over both meshes and the queue of the comparison, as measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +161,9 @@ def _row(mesh: Mesh, resolution: Number, options: dict) -> RoundTripRow:
     surface = marching_cubes(band, level=level, progress=options["progress"])
     marks.append(time.perf_counter())
     comparison = None
+    needed = BYTES_PER_FACE * (mesh.n_faces + surface.n_faces)
+    where = f"roundtrip(resolution={resolution:g}): {surface.n_faces:,} faces to compare"
+    require_memory(needed, options["max_memory"], where=where)
     if surface.n_faces:
         comparison = compare(
             mesh,

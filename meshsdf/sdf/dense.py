@@ -8,8 +8,9 @@ from ..mesh import Mesh
 from ..mesh.two_set import TwoSetReport, check
 from ..progress import Progress, silent
 from ..spatial.closest_point import ClosestPoint
+from .lattice import resolve_voxel_size
 from .memory import require_memory
-from .narrow_band import mesh_to_band
+from .narrow_band import check_half_width, mesh_to_band
 from .placed_mesh import bounding_faces, weld_faces
 from .sign import SignMethod, choose_sign
 
@@ -37,6 +38,12 @@ def mesh_to_grid(
     Accuracy: every value is the Euclidean distance rounded to float32, near and far.
     Cost: one closest-point query per node outside the band.
     """
+    size = resolve_voxel_size(mesh, resolution, voxel_size)
+    check_half_width(half_width)
+    first, shape = _node_box(mesh, size, half_width, translation)
+    where = f"mesh_to_grid(...): {shape[0]:.4g} x {shape[1]:.4g} x {shape[2]:.4g} nodes"
+    require_memory(4 * float(np.prod(shape)) + 150 * NODES_AT_ONCE, max_memory, where=where)
+    first, shape = first.astype(np.int64), shape.astype(np.int64)
     if report is None:
         report = check(mesh, self_intersections=False)
     band = mesh_to_band(
@@ -50,10 +57,6 @@ def mesh_to_grid(
         max_memory=max_memory,
         progress=progress,
     )
-    first, shape = _node_box(mesh, band)
-    where = f"mesh_to_grid(...): {shape[0]} x {shape[1]} x {shape[2]} nodes"
-    n_nodes = float(np.prod(shape.astype(float)))
-    require_memory(4 * n_nodes + 150 * NODES_AT_ONCE, max_memory, where=where)
     values = np.empty(shape, np.float32)
     query = ClosestPoint(_bounding_mesh(mesh, band, report))
     planes = max(1, int(NODES_AT_ONCE // np.prod(shape[1:])))
@@ -75,13 +78,14 @@ def _bounding_mesh(mesh: Mesh, band: NarrowBand, report: TwoSetReport) -> Mesh:
     return Mesh(points, faces[keep])
 
 
-def _node_box(mesh: Mesh, band: NarrowBand) -> tuple[np.ndarray, np.ndarray]:
-    """First node and number of nodes of the mesh's box grown by the band."""
-    box = mesh.box
-    low = (box.lower - band.translation) / band.voxel_size - band.half_width
-    high = (box.upper - band.translation) / band.voxel_size + band.half_width
-    first = np.floor(low).astype(np.int64)
-    return first, np.ceil(high).astype(np.int64) - first + 1
+def _node_box(
+    mesh: Mesh, voxel_size: float, half_width: Number, translation: Vector3 | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """First node and number of nodes of the mesh's box grown by the band; whole floats."""
+    origin = np.zeros(3) if translation is None else translation
+    first = np.floor((mesh.box.lower - origin) / voxel_size - half_width)
+    last = np.ceil((mesh.box.upper - origin) / voxel_size + half_width)
+    return first, last - first + 1
 
 
 def _distances(band: NarrowBand, query: ClosestPoint, ijk: np.ndarray) -> np.ndarray:

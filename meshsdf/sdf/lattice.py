@@ -16,6 +16,8 @@ from ..grid.brick_index import BRICK, PAGE
 from ..mesh import Mesh
 
 PAGE_NODES = BRICK * PAGE
+FINEST_VOXEL, LARGEST_VOXEL = 1e-30, 1e30  # so that a band's distances are normal float32 numbers
+SMALLEST_MESH = 1e-4  # voxels; anything smaller is one point to its volume
 COARSEST = 0.01  # voxels; coordinates stored more coarsely than this have lost their shape
 
 
@@ -94,12 +96,21 @@ def resolve_voxel_size(mesh: Mesh, resolution: Number | None, voxel_size: Number
     name, value = ("resolution", resolution) if voxel_size is None else ("voxel_size", voxel_size)
     if not (np.isfinite(value) and value > 0):
         raise SdfError(f"{name} is {value:g}", where, f"give a {name} above 0")
+    longest = np.float64(mesh.box.longest_side)
     if voxel_size is not None:
-        return float(voxel_size)
-    longest = mesh.box.longest_side
+        return _checked_size(float(voxel_size), longest, where)
     if longest == 0:
         raise SdfError("the mesh is a single point", where, "check the units of the mesh")
-    size = longest / float(resolution)
-    if not (np.isfinite(1 / size) and size > 0):
-        raise SdfError(f"voxels would be {size:g} wide", where, "give a lower resolution")
+    with np.errstate(over="ignore", under="ignore"):
+        return _checked_size(float(longest / float(resolution)), longest, where)
+
+
+def _checked_size(size: float, longest: Number, where: str) -> float:
+    if longest < SMALLEST_MESH * size:
+        what = f"voxels would be {size:g} wide, the mesh is {longest:g} long"
+        raise SdfError(what, where, "use smaller voxels, or check the units of the mesh")
+    if not FINEST_VOXEL <= size <= LARGEST_VOXEL:
+        span = f"{FINEST_VOXEL:g} to {LARGEST_VOXEL:g}"
+        what = f"voxels would be {size:g} wide; float32 distances want {span}"
+        raise SdfError(what, where, "choose another resolution, or other units for the mesh")
     return size

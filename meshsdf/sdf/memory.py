@@ -36,10 +36,11 @@ def estimate_bricks(
     the sum over directions is 3/2 (Cauchy). The box, grown by the reach, holds no more than its
     volume.
     """
-    with np.errstate(over="ignore"):
-        sheet = float(areas.sum()) / voxel_size**2 * (2 * reach + 1.5 * BRICK) / BRICK**3
-        boxed = float(np.prod((sides / voxel_size + 2 * reach) / BRICK + 2))
-    return min(boxed, sheet + float(((2 * reach + BRICK) / BRICK) ** 3))
+    with np.errstate(over="ignore", divide="ignore"):
+        size = np.float64(voxel_size)
+        sheet = areas.sum() / size / size * (2 * reach + 1.5 * BRICK) / BRICK**3
+        boxed = np.prod((sides / size + 2 * reach) / BRICK + 2)
+    return float(min(boxed, sheet + ((2 * reach + BRICK) / BRICK) ** 3))
 
 
 def require_memory(needed: Number, max_memory: Number | None, *, where: str) -> None:
@@ -64,6 +65,8 @@ def require_memory(needed: Number, max_memory: Number | None, *, where: str) -> 
 
 
 def _bytes(n: float) -> str:
+    if n >= 1e24:
+        return "more than a million EB"
     for unit, size in (("EB", 1e18), ("PB", 1e15), ("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
         if n >= size:
             return f"{n / size:.3g} {unit}"

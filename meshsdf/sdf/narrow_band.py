@@ -91,7 +91,7 @@ def mesh_to_band(
     California Institute of Technology, 2003.
     """
     size = resolve_voxel_size(mesh, resolution, voxel_size)
-    _check_half_width(half_width)
+    check_half_width(half_width)
     half_width = float(half_width)
     origin = np.zeros(3) if translation is None else np.asarray(translation, np.float64)
     _check_memory(mesh, size, half_width, closest, max_memory)
@@ -120,7 +120,8 @@ def mesh_to_band(
     return signed
 
 
-def _check_half_width(half_width: Number) -> None:
+def check_half_width(half_width: Number) -> None:
+    """Refuse a band of no use; SdfError."""
     if not MIN_HALF_WIDTH <= half_width <= MAX_HALF_WIDTH:
         raise SdfError(
             f"half_width is {half_width:g} voxels",

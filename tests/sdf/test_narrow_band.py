@@ -330,3 +330,29 @@ def test_coordinates_too_coarse_for_the_voxels_are_refused():
     far = Mesh(box_mesh().vertices + 1e15, box_mesh().faces)
     with pytest.raises(SdfError, match="are stored to"):
         mesh_to_band(far, resolution=100, sign="unsigned")
+
+
+def test_vertices_closer_than_rounding_do_no_harm():
+    # Apart by 1e-18 of the size: one place in voxels, two in the file
+    box = box_mesh()
+    vertices = np.concatenate([box.vertices, box.vertices + 1e-18])
+    vertices[8:, 0] = np.nextafter(vertices[8:, 0], 9)
+    faces = box.faces.copy()
+    faces[::2] += 8
+    band = mesh_to_band(Mesh(vertices + 1e3, faces), resolution=16)
+    assert band.value_at(np.rint((np.full((1, 3), 1e3)) / band.voxel_size).astype(np.int64)) < 0
+
+
+def test_walls_along_the_lattice_lines_keep_their_sides():
+    # Faces parallel to the scan lines, a hair from vertical, and exactly on the nodes
+    for shear in (0.0, 1e-15, 1e-9, 1e-3):
+        box = box_mesh(size=(2.0, 2.0, 2.0))
+        vertices = box.vertices.copy()
+        vertices[:, 0] += shear * vertices[:, 2]
+        band = mesh_to_band(Mesh(vertices, box.faces), voxel_size=0.125)
+        axis = np.arange(-12, 13)
+        ijk = np.stack(np.meshgrid(axis, axis, axis), -1).reshape(-1, 3)
+        points = band.to_world(ijk)
+        depth = np.abs(points - [shear, 0, 0] * points[:, 2:]).max(axis=1) - 1
+        clear = np.abs(depth) > 1e-8
+        assert_array_equal(band.value_at(ijk)[clear] < 0, depth[clear] < 0)
