@@ -8,7 +8,6 @@ holds a node within reach of the mesh is missed.
 import numpy as np
 from numba import njit
 
-from .brick_lookup import find_brick
 from .clip import clip_line, triangle_range
 
 
@@ -114,14 +113,17 @@ def list_bricks(root, pages, x, slot, coordinates):
     Writes their local coordinates when ``coordinates`` is not empty; returns how many there are.
     """
     n = 0
+    px = x >> 4
     for y in range(root.shape[1] * 16):
-        for z in range(root.shape[2] * 16):
-            if root[x >> 4, y >> 4, z >> 4] < 0:
+        for pz in range(root.shape[2]):
+            page = root[px, y >> 4, pz]
+            if page < 0:
                 continue
-            if find_brick(root, pages, x, y, z) >= 0:
-                if len(coordinates) > 0:
-                    pages[root[x >> 4, y >> 4, z >> 4], x & 15, y & 15, z & 15] = slot + n
-                    c = coordinates[slot + n]
-                    c[0], c[1], c[2] = x, y, z
-                n += 1
+            for z in range(16):
+                if pages[page, x & 15, y & 15, z] >= 0:
+                    if len(coordinates) > 0:
+                        pages[page, x & 15, y & 15, z] = slot + n
+                        c = coordinates[slot + n]
+                        c[0], c[1], c[2] = x, y, 16 * pz + z
+                    n += 1
     return n

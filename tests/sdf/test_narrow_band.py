@@ -356,3 +356,18 @@ def test_walls_along_the_lattice_lines_keep_their_sides():
         depth = np.abs(points - [shear, 0, 0] * points[:, 2:]).max(axis=1) - 1
         clear = np.abs(depth) > 1e-8
         assert_array_equal(band.value_at(ijk)[clear] < 0, depth[clear] < 0)
+
+
+def test_the_order_of_the_faces_changes_only_their_numbers():
+    mesh = torus(1.0, 0.3, n_major=24, n_minor=12)
+    order = np.random.default_rng(0).permutation(mesh.n_faces)
+    shuffled = Mesh(mesh.vertices, mesh.faces[order])
+    here = mesh_to_band(mesh, resolution=40, closest=True)
+    there = mesh_to_band(shuffled, resolution=40, closest=True)
+    assert here.values.tobytes() == there.values.tobytes()
+    assert here.active.tobytes() == there.active.tobytes()
+    assert_array_equal(here.index.coordinates, there.index.coordinates)
+    mask = here.active_mask()
+    # Where two faces are equally near, either may be named
+    same = here.closest_face[mask] == order[there.closest_face[mask]]
+    assert same.mean() > 0.5
