@@ -4,6 +4,7 @@ Exit codes: 0 done, the answer is yes; 1 done, the answer is no; 2 misuse; 3 the
 used or would not fit in memory; 130 interrupted.
 """
 
+import os
 import sys
 import traceback
 from importlib import import_module
@@ -35,6 +36,12 @@ class LazyGroup(click.Group):
         if name not in COMMANDS:
             return None
         return import_module(f".{name}", __package__).command
+
+    def invoke(self, ctx: click.Context):
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise _InterruptedError from None  # what click makes of it adds an empty line
 
     def resolve_command(self, ctx: click.Context, args: list[str]):
         name = args[0]
@@ -71,8 +78,9 @@ def run(arguments: list[str]) -> int:
     except MemoryError:
         fix = "lower the resolution, or set --max-memory to be told beforehand"
         return _refuse(MemoryLimitError("the system gave no more memory", "this command", fix))
-    except (KeyboardInterrupt, click.Abort):
-        click.echo("interrupted; nothing is left half written", err=True)
+    except (KeyboardInterrupt, _InterruptedError, click.Abort):
+        after_the_key = "\n" if sys.stderr is not None and sys.stderr.isatty() else ""
+        click.echo(f"{after_the_key}interrupted; nothing is left half written", err=True)
         return INTERRUPTED
     except Exception as error:  # noqa: BLE001 (a fault of ours must not look like the answer "no")
         return _refuse(UnexpectedError(*_fault(error)))
@@ -82,7 +90,15 @@ def main() -> None:
     """Entry point of the console script."""
     if sys.stdout is not None:
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be any bytes
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    if code == INTERRUPTED:
+        # At once: the interpreter's own way out forgets the code if an import was interrupted
+        os._exit(code)
+    sys.exit(code)
+
+
+class _InterruptedError(Exception):
+    """Ctrl-C was pressed while a command ran."""
 
 
 class UnexpectedError(MeshsdfError):

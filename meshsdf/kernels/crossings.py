@@ -18,7 +18,7 @@ from .brick_lookup import INSIDE, find_brick
 
 
 @njit(cache=True, nogil=True)
-def _edge_height(p, q, vp, vq, x):
+def edge_height(p, q, vp, vq, x):
     """Where edge pq passes line x, and 1 when it runs up, -1 down, 0 when it does not."""
     up = p[0] <= x < q[0]
     down = q[0] <= x < p[0]
@@ -53,12 +53,12 @@ def count_crossings(
             for e in range(3):
                 vp, vq = v[e], v[(e + 1) % 3]
                 p, q = points[vp], points[vq]
-                y, way = _edge_height(p, q, vp, vq, x)
+                y, way = edge_height(p, q, vp, vq, x)
                 if way == 0:
                     continue
                 if len(edge_line) > 0 and edge_line[f, e] >= 0:
                     line = line_ends[edge_line[f, e]]
-                    y, _ = _edge_height(points[line[0]], points[line[1]], line[0], line[1], x)
+                    y, _ = edge_height(points[line[0]], points[line[1]], line[0], line[1], x)
                 z = p[2] + (q[2] - p[2]) * ((x - p[0]) / (q[0] - p[0]))
                 if way > 0:
                     y_up, z_up, n_up = y, z, 1

@@ -15,9 +15,15 @@ from .pieces import connected_labels
 from .weld import weld
 
 
+def area_vectors(mesh: Mesh) -> Float64[np.ndarray, "m 3"]:
+    """(m, 3) area times normal of every face, square world units."""
+    edges = _edges_from_first_corner(mesh)
+    return 0.5 * np.cross(edges[:, 0], edges[:, 1])
+
+
 def face_areas(mesh: Mesh) -> FaceValues:
     """(m,) area of every face, square world units; exactly 0 only where rounding says so."""
-    return 0.5 * np.linalg.norm(_doubled_area_vectors(mesh), axis=1)
+    return np.linalg.norm(area_vectors(mesh), axis=1)
 
 
 def face_normals(mesh: Mesh) -> Float64[np.ndarray, "m 3"]:
@@ -117,8 +123,3 @@ def _edges(mesh: Mesh) -> EdgeTable:
 def _edges_from_first_corner(mesh: Mesh) -> Float64[np.ndarray, "m 2 3"]:
     triangles = mesh.triangles
     return triangles[:, 1:] - triangles[:, :1]
-
-
-def _doubled_area_vectors(mesh: Mesh) -> Float64[np.ndarray, "m 3"]:
-    edges = _edges_from_first_corner(mesh)
-    return np.cross(edges[:, 0], edges[:, 1])

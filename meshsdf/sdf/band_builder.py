@@ -19,10 +19,8 @@ from ..kernels.crossings import count_crossings, resolve_signs
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from ..progress import Progress
 from .lattice import Lattice
-from .memory import BYTES_PER_BRICK, BYTES_PER_BRICK_CLOSEST, SCRATCH_PER_BRICK, require_memory
+from .memory import MARKED_PER_KEPT, SLABS_PER_THREAD, band_bytes, require_memory
 from .placed_mesh import PlacedMesh
-
-SLABS_PER_THREAD = 8  # enough to even out the work, few enough to keep rows long
 
 
 @dataclass
@@ -115,10 +113,11 @@ class BandBuilder:
         self.slot0 = [int(slots[a - first]) for a, _ in self.slabs] + [int(slots[-1])]
 
     def _require_memory(self, n_bricks: int) -> None:
-        per_brick = BYTES_PER_BRICK + (BYTES_PER_BRICK_CLOSEST if self.closest else 0)
-        scratch = n_bricks * SCRATCH_PER_BRICK * n_threads() / max(1, len(self.slabs))
+        needed = band_bytes(
+            n_bricks / MARKED_PER_KEPT, len(self.placed.faces), closest=self.closest
+        )
         where = f"mesh_to_band(...): {n_bricks} bricks"
-        require_memory(n_bricks * per_brick + scratch, self.max_memory, where=where)
+        require_memory(needed, self.max_memory, where=where)
 
     def _allocate(self) -> None:
         n = len(self.coordinates)

@@ -6,18 +6,12 @@ from ..arrays import Number, Vector3
 from ..errors import SdfError
 from ..grid import NarrowBand
 from ..mesh import Mesh
-from ..mesh.measures import face_areas
+from ..mesh.measures import area_vectors
 from ..mesh.two_set import TwoSetReport, check
 from ..progress import Progress, silent
 from .band_builder import BandBuilder
 from .lattice import Lattice, resolve_voxel_size
-from .memory import (
-    BYTES_PER_BRICK,
-    BYTES_PER_BRICK_CLOSEST,
-    BYTES_PER_FACE,
-    estimate_bricks,
-    require_memory,
-)
+from .memory import band_bytes, estimate_bricks, require_memory
 from .open_sign import sign_by_winding_number
 from .placed_mesh import place, weld_faces
 from .sign import SignMethod, choose_sign
@@ -133,10 +127,10 @@ def check_half_width(half_width: Number) -> None:
 def _check_memory(
     mesh: Mesh, size: float, half_width: Number, closest: bool, max_memory: Number | None
 ) -> None:
-    per_brick = BYTES_PER_BRICK + (BYTES_PER_BRICK_CLOSEST if closest else 0)
-    n_bricks = estimate_bricks(face_areas(mesh), mesh.box.size, size, half_width)
+    n_bricks = estimate_bricks(area_vectors(mesh), mesh.box.size, size, half_width)
     where = f"mesh_to_band(voxel_size={size:g}): about {n_bricks:.3g} bricks of 8x8x8 nodes"
-    require_memory(n_bricks * per_brick + mesh.n_faces * BYTES_PER_FACE, max_memory, where=where)
+    needed = band_bytes(n_bricks, mesh.n_faces, closest=closest)
+    require_memory(needed, max_memory, where=where)
 
 
 def _check_leaks(n_leaks: int) -> None:

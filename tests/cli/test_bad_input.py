@@ -154,7 +154,7 @@ def test_parity_of_an_open_mesh_is_refused_with_the_number_of_open_edges(cli, tm
     path = tmp_path / "a.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     outcome = cli("convert", path, tmp_path / "a.npz", "--sign", "parity")
-    assert_refused(outcome, "3 open edges", "--sign winding")
+    assert_refused(outcome, "3 open edges", "winding")
 
 
 def test_a_level_that_nothing_crosses_is_refused(cli, tmp_path):
