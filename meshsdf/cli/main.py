@@ -7,6 +7,7 @@ used or would not fit in memory; 130 interrupted.
 import os
 import sys
 import traceback
+import warnings
 from importlib import import_module
 from pathlib import Path
 
@@ -90,6 +91,7 @@ def main() -> None:
     """Entry point of the console script."""
     if sys.stdout is not None:
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be any bytes
+    warnings.simplefilter("ignore", RuntimeWarning)  # overflow is judged where it matters
     code = run(sys.argv[1:])
     if code == INTERRUPTED:
         # At once: the interpreter's own way out forgets the code if an import was interrupted

@@ -49,6 +49,9 @@ class NarrowBand:
         Face of the mesh with the closest point; -1 at nodes that are not active.
     barycentric : (b, 8, 8, 8, 2) float32 or None
         Weights of the face's second and third corner at the closest point.
+    uncertain_voxels : int or None
+        Of an open mesh: at how many nodes the winding number is within 0.05 of 1/2, so that the
+        side depends on how one thinks of the openings as filled.
     """
 
     index: BrickIndex
@@ -60,6 +63,7 @@ class NarrowBand:
     sign: str
     closest_face: BrickFaces | None = None
     barycentric: BrickBarycentrics | None = None
+    uncertain_voxels: int | None = None
 
     def __post_init__(self) -> None:
         n = self.index.n_bricks
@@ -134,7 +138,7 @@ class NarrowBand:
     def facts(self) -> dict:
         """Return what scripts ask for: kind, voxel_size, shape, active_voxels, n_bricks, …"""
         low, high = self.active_box()
-        return {
+        facts = {
             "kind": "narrow band",
             "voxel_size": self.voxel_size,
             "translation": self.translation.tolist(),
@@ -147,6 +151,9 @@ class NarrowBand:
             "sign": self.sign,
             "has_closest_faces": self.closest_face is not None,
         }
+        if self.uncertain_voxels is not None:
+            facts["uncertain_voxels"] = self.uncertain_voxels
+        return facts
 
     def value_at(self, ijk: Ijk) -> Values:
         """Return the (n,) values at nodes; +-background where there is no brick."""

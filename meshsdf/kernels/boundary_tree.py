@@ -36,6 +36,22 @@ FAN_AREA = 21  # sum of the fan's areas, each positive
 
 
 @njit(cache=True, nogil=True)
+def follow_loops(after, order, loop):
+    """List edges loop by loop: ``order`` (h,) and ``loop`` (h,) int32; ``after[e]`` follows e."""
+    done = np.zeros(len(after), np.bool_)
+    n, n_loops = 0, 0
+    for start in range(len(after)):
+        e = start
+        while not done[e]:
+            done[e] = True
+            order[n], loop[n] = e, n_loops
+            n += 1
+            e = after[e]
+        n_loops = loop[n - 1] + 1
+    return n_loops
+
+
+@njit(cache=True, nogil=True)
 def split_chain(loop, nodes):
     """Cut the sequence in two again and again; fill ``nodes`` (n, 5) in preorder, return n.
 

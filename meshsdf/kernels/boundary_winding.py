@@ -41,7 +41,7 @@ BESIDE = 1e-150  # stands for an infinitely small step; its square is still a fl
 TURN = 2.0 * np.pi
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def _seen(points, v, p):
     """Vertex v from p: x, y, z, and the stereographic coordinates qx, qy, P."""
     x, y, z = points[v, 0] - p[0], points[v, 1] - p[1], points[v, 2] - p[2]
@@ -55,11 +55,11 @@ def _seen(points, v, p):
 
 
 @njit(cache=True, nogil=True)
-def _rule_turn(points, v, w, line, line_ends, a, b, cross, p):
+def _rule_turn(points, v, w, line, line_ends, a, b, cross, dot, p):
     """Whole turns that make the argument of edge vw agree with the crossing rule."""
     in_range = (a[0] <= 0.0) != (b[0] <= 0.0)
     if not in_range:
-        if cross != 0.0 or a[1] * b[1] >= 0.0 or a[2] + b[2] > 0.0:
+        if cross != 0.0 or a[1] * b[1] >= 0.0 or dot >= 0.0:
             return 0
         # The line meets an edge seen end on, at x = 0: it is taken to pass beyond it
         return -1 if (b[1] > a[1]) == (b[0] <= 0.0) else 0
@@ -93,7 +93,7 @@ def _sum_edges(points, chain, chain_line, line_ends, first, last, p):
             and min(a[1], b[1]) <= NEAR_LINE
             and max(a[1], b[1]) >= -NEAR_LINE
         ):
-            turns += _rule_turn(points, v, w, chain_line[e], line_ends, a, b, cross, p)
+            turns += _rule_turn(points, v, w, chain_line[e], line_ends, a, b, cross, dot, p)
     return angle / TURN + turns
 
 
@@ -207,9 +207,7 @@ def variation(boundary, p, half, limit):
                 d = _segment_distance(a, b, p) - reach
                 if d <= 0.0:
                     return np.inf
-                length = np.sqrt(
-                    (b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2
-                )
+                length = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
                 total += scale * min(length / d, 2.0) / d
             n = nodes[n, 2]
         else:

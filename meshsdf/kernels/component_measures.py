@@ -1,4 +1,4 @@
-"""Area, signed volume and box of every connected component, in one pass over the faces."""
+"""Sums over the faces of a mesh: area, shadows, signed volume, boxes, in one pass."""
 
 import numpy as np
 from numba import njit
@@ -29,3 +29,17 @@ def measure_components(points, faces, component, center, n_faces, area, volume, 
         n_faces[c] += 1
         area[c] += 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
         volume[c] += (ax * nx + ay * ny + az * nz) / 6
+
+
+@njit(cache=True, nogil=True)
+def sum_areas(points, faces):
+    """Total area, and the sum of the areas of the shadows on the three coordinate planes."""
+    area = shadow = 0.0
+    for f in range(len(faces)):
+        a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
+        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        area += 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
+        shadow += 0.5 * (abs(nx) + abs(ny) + abs(nz))
+    return area, shadow

@@ -12,18 +12,12 @@ from ..kernels.edges import connect_faces
 from .edge_table import EdgeTable, edge_table
 from .mesh import Mesh
 from .pieces import connected_labels
-from .weld import weld
-
-
-def area_vectors(mesh: Mesh) -> Float64[np.ndarray, "m 3"]:
-    """(m, 3) area times normal of every face, square world units."""
-    edges = _edges_from_first_corner(mesh)
-    return 0.5 * np.cross(edges[:, 0], edges[:, 1])
 
 
 def face_areas(mesh: Mesh) -> FaceValues:
     """(m,) area of every face, square world units; exactly 0 only where rounding says so."""
-    return np.linalg.norm(area_vectors(mesh), axis=1)
+    edges = _edges_from_first_corner(mesh)
+    return 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
 
 
 def face_normals(mesh: Mesh) -> Float64[np.ndarray, "m 3"]:
@@ -112,8 +106,7 @@ def n_boundary_loops(mesh: Mesh) -> int:
 
 def welded(mesh: Mesh) -> Mesh:
     """Return the shape of the mesh with equal positions made one vertex, attributes left out."""
-    labels, points = weld(mesh.vertices)
-    return Mesh(points, labels[mesh.faces])
+    return Mesh(mesh.welded.points, mesh.welded.faces)
 
 
 def _edges(mesh: Mesh) -> EdgeTable:

@@ -4,6 +4,7 @@ Nothing is merged, moved or removed here; what the file said is what the mesh ho
 """
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt8
@@ -11,6 +12,7 @@ from jaxtyping import Float32, Float64, Int32, UInt8
 from ..arrays import Faces, Points
 from ..box import Box
 from ..errors import MeshError
+from .welded import Welded, weld_mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +87,7 @@ class Mesh:
         """Number of triangles, degenerate ones included."""
         return len(self.faces)
 
-    @property
+    @cached_property
     def box(self) -> Box:
         """The smallest box around the vertices that faces use.
 
@@ -96,7 +98,14 @@ class Mesh:
         """
         if self.n_faces == 0:
             raise MeshError("the mesh has no faces, so it has no extent", "Mesh.box", "add faces")
-        return Box.around(self.vertices[np.unique(self.faces)])
+        used = np.zeros(self.n_vertices, bool)
+        used[self.faces] = True
+        return Box.around(self.vertices[used])
+
+    @cached_property
+    def welded(self) -> Welded:
+        """Equal positions joined, and the edges; made once and kept, about 80 bytes per face."""
+        return weld_mesh(self.vertices, self.faces)
 
     @property
     def triangles(self) -> Float64[np.ndarray, "m 3 3"]:

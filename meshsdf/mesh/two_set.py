@@ -31,7 +31,6 @@ from .holes import trace_holes
 from .mesh import Mesh
 from .self_intersections import find_self_intersections
 from .two_set_report import Sign, TwoSetReport
-from .weld import weld
 
 SOUP = 0.5  # a mesh with more than this share of its edges open bounds nothing worth a sign
 
@@ -64,9 +63,7 @@ def check(
     if mesh.n_faces == 0:
         raise MeshError("the mesh has no faces", "check(mesh)", "pass a mesh with faces")
     progress("edges", 0.0)
-    labels, points = weld(mesh.vertices)
-    faces = labels[mesh.faces]
-    table = edge_table(faces, len(points))
+    points, faces, table = mesh.welded.points, mesh.welded.faces, mesh.welded.table
     is_welded = len(points) < mesh.n_vertices
     by_index = edge_table(mesh.faces, mesh.n_vertices) if is_welded else table
     lines = None if table.is_balanced else residual_lines(table, points)

@@ -14,13 +14,14 @@ from ..grid import BrickIndex, NarrowBand
 from ..kernels.band_distance import scan_edges, scan_faces, scan_vertices
 from ..kernels.brick_finish import closest_in_bricks, keep_active, renumber
 from ..kernels.brick_lookup import OUTSIDE
-from ..kernels.brick_marks import bin_by_x, extents_x, list_bricks, mark_cells
+from ..kernels.brick_marks import list_bricks, mark_cells
 from ..kernels.crossings import count_crossings, resolve_signs
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from ..progress import Progress
 from .lattice import Lattice
 from .memory import MARKED_PER_KEPT, SLABS_PER_THREAD, band_bytes, require_memory
 from .placed_mesh import PlacedMesh
+from .slabs import bin_features, items_of
 
 
 @dataclass
@@ -55,11 +56,15 @@ class BandBuilder:
     def _mark(self) -> None:
         points, faces = self.placed.points, self.placed.faces
         self.root = np.full(self.lattice.n_pages, OUTSIDE, np.int32)
-        all_faces = np.arange(len(faces), dtype=np.int32)
+        ranges = even_ranges(len(faces), SLABS_PER_THREAD * n_threads())
         nothing = np.empty((0, 16, 16, 16), np.int32)
-        mark_cells(
-            points, faces, all_faces, self.half_width, 7, 0, len(self.root), self.root, nothing
-        )
+
+        def mark_pages(piece: int) -> None:
+            ids = np.arange(*ranges[piece], dtype=np.int32)
+            reach, root = self.half_width, self.root
+            mark_cells(points, faces, ids, reach, 7, 0, len(root), root, nothing)
+
+        run_pieces(mark_pages, len(ranges))
         used = self.root == 0
         n_pages = int(np.count_nonzero(used))
         require_memory(n_pages * 16384, self.max_memory, where="mesh_to_band(...): page table")
@@ -78,16 +83,22 @@ class BandBuilder:
         edges = np.array([8.0 * low] + [8.0 * b for _, b in self.slabs])
         used = np.flatnonzero(np.diff(features.start)).astype(np.int32)
         reach = self.half_width + 1.0
-        self.faces_of = self.closed_faces_of = _bin(points, faces, edges, reach)
+        kinds = [features.ends, faces, used[:, None]]
         if self.closed is not self.placed:
-            self.closed_faces_of = _bin(points, self.closed.faces, edges, reach)
-        self.edges_of = _bin(points, features.ends, edges, reach)
-        start, items = _bin(points, used[:, None], edges, reach)
+            kinds.append(self.closed.faces)
+        lists = [None] * len(kinds)
+
+        def bin_kind(kind: int) -> None:
+            lists[kind] = bin_features(points, kinds[kind], edges, reach)
+
+        run_pieces(bin_kind, len(kinds))
+        self.edges_of, self.faces_of, (start, items) = lists[:3]
         self.vertices_of = start, used[items]
+        self.closed_faces_of = lists[-1] if self.closed is not self.placed else self.faces_of
 
     def _mark_slab(self, s: int) -> None:
         first, last = self.slabs[s]
-        ids = _items(self.faces_of, s)
+        ids = items_of(self.faces_of, s)
         points, faces = self.placed.points, self.placed.faces
         mark_cells(points, faces, ids, self.half_width, 3, first, last, self.root, self.pages)
 
@@ -171,8 +182,8 @@ class BandBuilder:
         first, last = self.slabs[s]
         window = (self.half_width, 8 * first, 8 * last, self.root, self.pages, a, squared, nearest)
         points, faces, f = self.placed.points, self.placed.faces, self.placed.features
-        scan_faces(points, faces, _items(self.faces_of, s), *window)
-        edges, vertices = _items(self.edges_of, s), _items(self.vertices_of, s)
+        scan_faces(points, faces, items_of(self.faces_of, s), *window)
+        edges, vertices = items_of(self.edges_of, s), items_of(self.vertices_of, s)
         scan_edges(points, faces, f.ends, f.first, f.order, edges, *window)
         scan_vertices(points, f.ends, f.first, f.order, f.start, f.edges, vertices, *window)
         return squared, nearest
@@ -187,7 +198,7 @@ class BandBuilder:
             self.closed.faces,
             self.closed.edge_line,
             self.closed.line_ends,
-            _items(self.closed_faces_of, s),
+            items_of(self.closed_faces_of, s),
             8 * first,
             8 * last,
             self.root,
@@ -229,21 +240,3 @@ class BandBuilder:
             shaped(self.closest_face[:n]) if self.closest else None,
             self.barycentric[:n].reshape(n, 8, 8, 8, 2) if self.closest else None,
         )
-
-
-def _bin(
-    points: np.ndarray, corners: np.ndarray, edges: np.ndarray, reach: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """CSR lists (start, items) of the features that reach into each slab."""
-    low, high = np.empty(len(corners)), np.empty(len(corners))
-    extents_x(points, corners, reach, low, high)
-    start = np.zeros(len(edges), np.int64)
-    bin_by_x(low, high, edges, start, np.empty(0, np.int32), len(corners))
-    items = np.empty(start[-1], np.int32)
-    bin_by_x(low, high, edges, start, items, len(corners))
-    return start, items
-
-
-def _items(lists: tuple[np.ndarray, np.ndarray], s: int) -> np.ndarray:
-    start, items = lists
-    return items[start[s] : start[s + 1]]

@@ -11,7 +11,7 @@ from ..spatial.closest_point import ClosestPoint
 from .lattice import resolve_voxel_size
 from .memory import require_memory
 from .narrow_band import check_half_width, mesh_to_band
-from .placed_mesh import bounding_faces, weld_faces
+from .placed_mesh import bounding_faces
 from .sign import SignMethod, choose_sign
 
 NODES_AT_ONCE = 1 << 20
@@ -73,9 +73,9 @@ def _bounding_mesh(mesh: Mesh, band: NarrowBand, report: TwoSetReport) -> Mesh:
     by_crossings = (
         band.is_signed and choose_sign(report, band.sign, voxel_size=band.voxel_size).by_crossings
     )
-    points, faces = weld_faces(mesh)
-    keep = bounding_faces(points, faces, cancel=band.sign if by_crossings else "unsigned")
-    return Mesh(points, faces[keep])
+    cancel = band.sign if by_crossings else "unsigned"
+    keep = bounding_faces(mesh.welded, cancel=cancel, report=report)
+    return Mesh(mesh.welded.points, mesh.welded.faces[keep])
 
 
 def _node_box(

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Number, Points, Vector3
+from ..arrays import Number
 from ..errors import MemoryLimitError
 from ..grid.brick_index import BRICK
+from ..kernels.component_measures import sum_areas
+from ..mesh import Mesh
 
 BYTES_PER_BRICK = 512 * 4 + 350  # values; masks, coordinates and its share of pages
 BYTES_PER_BRICK_CLOSEST = 512 * (4 + 8)
@@ -30,21 +32,8 @@ def available_memory() -> int | None:
         return None
 
 
-def estimate_bricks(
-    area_vectors: Points, sides: Vector3, voxel_size: Number, reach: Number
-) -> float:
-    """Expected number of bricks within ``reach`` voxels of faces.
-
-    Parameters
-    ----------
-    area_vectors : (m, 3) float64
-        Area times normal of every face, square world units.
-    sides : (3,) float64
-        Of the box around them, world units.
-    voxel_size : float
-        World units.
-    reach : float
-        Voxels.
+def estimate_bricks(mesh: Mesh, voxel_size: Number, reach: Number) -> float:
+    """Expected number of bricks that hold a node within ``reach`` voxels of a mesh.
 
     Notes
     -----
@@ -53,12 +42,11 @@ def estimate_bricks(
     lie within the band of others count twice. The box, grown by the reach, holds no more bricks
     than its volume.
     """
+    area, shadow = sum_areas(mesh.welded.points, mesh.welded.faces)
     with np.errstate(over="ignore", divide="ignore"):
         size = np.float64(voxel_size)
-        area = np.linalg.norm(area_vectors, axis=1).sum() / size / size
-        shadow = np.abs(area_vectors).sum() / size / size
-        sheet = (2 * reach * area + (BRICK - 1) * shadow) / BRICK**3
-        boxed = np.prod((sides / size + 2 * reach) / BRICK + 2)
+        sheet = (2 * reach * area + (BRICK - 1) * shadow) / size / size / BRICK**3
+        boxed = np.prod((mesh.box.size / size + 2 * reach) / BRICK + 2)
     return float(min(boxed, sheet + ((2 * reach + BRICK) / BRICK) ** 3))
 
 

@@ -6,14 +6,14 @@ from ..arrays import Number, Vector3
 from ..errors import SdfError
 from ..grid import NarrowBand
 from ..mesh import Mesh
-from ..mesh.measures import area_vectors
 from ..mesh.two_set import TwoSetReport, check
+from ..mesh.welded import weld_mesh
 from ..progress import Progress, silent
 from .band_builder import BandBuilder
 from .lattice import Lattice, resolve_voxel_size
 from .memory import band_bytes, estimate_bricks, require_memory
 from .open_sign import sign_by_winding_number
-from .placed_mesh import place, weld_faces
+from .placed_mesh import place
 from .sign import SignMethod, choose_sign
 
 MIN_HALF_WIDTH = 1.0
@@ -92,13 +92,15 @@ def mesh_to_band(
     if report is None:
         report = check(mesh, self_intersections=False)
     choice = choose_sign(report, sign, voxel_size=size)
-    points, faces = weld_faces(mesh)
-    lattice = Lattice.around(points[np.unique(faces)], size, origin, half_width)
+    points, faces = mesh.welded.points, mesh.welded.faces
+    corners = np.stack([mesh.box.lower, mesh.box.upper])
+    lattice = Lattice.around(corners, size, origin, half_width)
     cancel = choice.method if choice.by_crossings else "unsigned"
-    placed = place(points, faces, lattice, cancel=cancel)
+    placed = place(mesh.welded, lattice, cancel=cancel, report=report)
     closed = placed
     if choice.by_crossings and report.repair is not None:
-        closed = place(points, report.repair.labels[faces], lattice, cancel=cancel)
+        zipped = weld_mesh(points, report.repair.labels[faces])
+        closed = place(zipped, lattice, cancel=cancel)
     builder = BandBuilder(
         placed, closed, lattice, half_width, cancel, closest, max_memory, progress
     )
@@ -108,7 +110,7 @@ def mesh_to_band(
         return band
     if choice.method == "unsigned":
         return band
-    signed = sign_by_winding_number(band, mesh, max_memory=max_memory, progress=progress)
+    signed = sign_by_winding_number(band, placed, max_memory=max_memory, progress=progress)
     if sign == "auto" and not (signed.values < 0).any():
         return band  # nothing is wound about: a sheet
     return signed
@@ -127,7 +129,7 @@ def check_half_width(half_width: Number) -> None:
 def _check_memory(
     mesh: Mesh, size: float, half_width: Number, closest: bool, max_memory: Number | None
 ) -> None:
-    n_bricks = estimate_bricks(area_vectors(mesh), mesh.box.size, size, half_width)
+    n_bricks = estimate_bricks(mesh, size, half_width)
     where = f"mesh_to_band(voxel_size={size:g}): about {n_bricks:.3g} bricks of 8x8x8 nodes"
     needed = band_bytes(n_bricks, mesh.n_faces, closest=closest)
     require_memory(needed, max_memory, where=where)

@@ -7,58 +7,51 @@ the band is closed. The opening's membrane starts at the rim, inside the band, a
 from brick to brick through the faces on which the sign changes.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays import Number
 from ..grid import BrickIndex, NarrowBand
 from ..grid.brick_index import BRICK
-from ..mesh import Mesh
 from ..progress import Progress
-from ..spatial.winding_number import winding_number
+from .lattice_winding import LatticeWinding
 from .memory import BYTES_PER_BRICK, require_memory
-
-BRICKS_AT_ONCE = 4096  # 2 M points, 50 MB
+from .placed_mesh import PlacedMesh
 
 
 def sign_by_winding_number(
-    band: NarrowBand, mesh: Mesh, *, max_memory: Number | None, progress: Progress
+    band: NarrowBand, placed: PlacedMesh, *, max_memory: Number | None, progress: Progress
 ) -> NarrowBand:
     """Return the unsigned band with signs, and with bricks added along the membranes.
 
+    The values of ``band`` are used up.
+
     Notes
     -----
-    Accuracy: distances are untouched. The sign is that of libigl's fast winding number, exact
-    where its magnitude is farther from 1/2 than that method's error (about 0.01); nodes of one
-    missing region get one sign, that of its first brick.
+    Accuracy: distances are untouched. The sign is that of the exact generalised winding number,
+    up to rounding (1e-12, or more within 1e-6 voxels of a boundary edge); nodes of one missing
+    region get one sign, that of its first brick. ``uncertain_voxels`` counts the nodes of bricks
+    at which it is nearer to 1/2 than 0.05.
     """
-    inside = _inside(band, mesh, band.index.coordinates, progress)
+    winding = LatticeWinding(placed, band.index)
     coordinates = band.index.coordinates
+    inside, uncertain = winding.first_sides(progress)
+    n_uncertain = int(uncertain.sum())
     while True:
         grown = _across_mixed_faces(coordinates, inside)
         if len(grown) == 0:
             break
         n = len(coordinates) + len(grown)
         require_memory(2 * n * BYTES_PER_BRICK, max_memory, where="mesh_to_band(...): openings")
-        more = _inside(band, mesh, grown, progress)
+        more, uncertain = winding.sides(grown, progress)
+        n_uncertain += int(uncertain.sum())
         coordinates = np.concatenate([coordinates, grown])
         inside = np.concatenate([inside, more])
         order = np.lexsort(coordinates.T[::-1])
         coordinates, inside = coordinates[order], inside[order]
-    index = BrickIndex.from_coordinates(coordinates, _inner_bricks(band, mesh, coordinates))
-    return _signed(band, index, inside)
-
-
-def _inside(band: NarrowBand, mesh: Mesh, bricks: np.ndarray, progress: Progress) -> np.ndarray:
-    """(b, 8, 8, 8) bool: which nodes of the bricks are inside."""
-    inside = np.empty((len(bricks), BRICK, BRICK, BRICK), bool)
-    offsets = np.indices((BRICK, BRICK, BRICK)).reshape(3, -1).T
-    for first in range(0, len(bricks), BRICKS_AT_ONCE):
-        some = slice(first, first + BRICKS_AT_ONCE)
-        ijk = (bricks[some, None, :] * BRICK + offsets).reshape(-1, 3)
-        wound = winding_number(mesh, band.to_world(ijk))
-        inside[some] = (np.abs(wound) > 0.5).reshape(-1, BRICK, BRICK, BRICK)
-        progress("sign", min(1.0, (first + BRICKS_AT_ONCE) / len(bricks)))
-    return inside
+    inner = _inner_bricks(winding, coordinates)
+    return _signed(band, coordinates, inner, inside, n_uncertain)
 
 
 def _across_mixed_faces(coordinates: np.ndarray, inside: np.ndarray) -> np.ndarray:
@@ -74,7 +67,7 @@ def _across_mixed_faces(coordinates: np.ndarray, inside: np.ndarray) -> np.ndarr
     return candidates[known.lookup(candidates) < 0]
 
 
-def _inner_bricks(band: NarrowBand, mesh: Mesh, coordinates: np.ndarray) -> np.ndarray:
+def _inner_bricks(winding: LatticeWinding, coordinates: np.ndarray) -> np.ndarray:
     """Missing bricks that lie inside; each connected region of them is judged once."""
     from scipy import ndimage  # only open meshes wait for it
 
@@ -89,32 +82,39 @@ def _inner_bricks(band: NarrowBand, mesh: Mesh, coordinates: np.ndarray) -> np.n
     if len(first) == 0:
         return np.empty((0, 3), np.int64)
     bricks = np.stack(np.unravel_index(first, regions.shape), axis=1) + low
-    wound = winding_number(mesh, band.to_world(bricks * BRICK + BRICK // 2))
-    inner = flat[first][np.abs(wound) > 0.5]
+    inner = flat[first][np.abs(winding.at_centers(bricks)) > 0.5]
     return np.argwhere(np.isin(regions, inner)) + low
 
 
-def _signed(band: NarrowBand, index: BrickIndex, inside: np.ndarray) -> NarrowBand:
+def _signed(
+    band: NarrowBand,
+    coordinates: np.ndarray,
+    inner: np.ndarray,
+    inside: np.ndarray,
+    n_uncertain: int,
+) -> NarrowBand:
     """The band on a larger index; new bricks are empty but for their sign."""
+    index = band.index
+    if len(coordinates) > index.n_bricks or len(inner):
+        index = BrickIndex.from_coordinates(coordinates, inner)
     old = index.lookup(band.index.coordinates)
 
     def spread(array: np.ndarray | None, empty: Number) -> np.ndarray | None:
-        if array is None:
-            return None
+        if array is None or len(array) == index.n_bricks:
+            return array
         wide = np.full((index.n_bricks, *array.shape[1:]), empty, array.dtype)
         wide[old] = array
         return wide
 
     values = spread(band.values, band.background)
     np.negative(values, out=values, where=inside)
-    return NarrowBand(
-        index,
-        values,
-        spread(band.active, 0),
-        band.voxel_size,
-        band.translation,
-        band.half_width,
-        "winding",
-        spread(band.closest_face, -1),
-        spread(band.barycentric, 0.0),
+    return replace(
+        band,
+        index=index,
+        values=values,
+        active=spread(band.active, 0),
+        sign="winding",
+        closest_face=spread(band.closest_face, -1),
+        barycentric=spread(band.barycentric, 0.0),
+        uncertain_voxels=n_uncertain,
     )

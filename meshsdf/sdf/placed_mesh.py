@@ -14,8 +14,15 @@ from jaxtyping import Int32
 from ..arrays import FaceLabels, FaceMask, Faces, Points
 from ..errors import SdfError
 from ..kernels.vertex_edges import edges_of_vertices
-from ..mesh import Mesh, degenerate_faces, net_faces, odd_faces, residual_edge_lines, weld
+from ..mesh import (
+    TwoSetReport,
+    degenerate_faces,
+    net_faces,
+    odd_faces,
+    residual_edge_lines,
+)
 from ..mesh.edge_table import EdgeTable, edge_table
+from ..mesh.welded import Welded
 from .lattice import Lattice
 
 
@@ -79,27 +86,26 @@ class PlacedMesh:
         return Features(table.edges, table.half_edges, first, edges, start)
 
 
-def weld_faces(mesh: Mesh) -> tuple[Points, Faces]:
-    """Return the distinct positions of the mesh, and its faces in terms of them."""
-    labels, points = weld(mesh.vertices)
-    return points, labels[mesh.faces]
-
-
-def bounding_faces(points: Points, faces: Faces, *, cancel: str) -> FaceMask:
+def bounding_faces(welded: Welded, *, cancel: str, report: TwoSetReport | None = None) -> FaceMask:
     """Mark the faces that bound something.
 
     Parameters
     ----------
-    points, faces
-        From `weld_faces`.
+    welded : Welded
+        Of the mesh.
     cancel : "parity", "winding" or "unsigned"
         Which sheets to leave out: those in even number, those that come with their reverse, none.
+    report : TwoSetReport, optional
+        What `check` said of the mesh; saves the search where it found nothing to leave out.
 
     Raises
     ------
     SdfError
         Nothing is left.
     """
+    points, faces = welded.points, welded.faces
+    if report is not None and report.n_degenerate_faces == report.n_duplicate_faces == 0:
+        return np.ones(len(faces), bool)
     keep = ~degenerate_faces(points, faces)
     if not keep.any():
         raise SdfError(
@@ -118,11 +124,15 @@ def bounding_faces(points: Points, faces: Faces, *, cancel: str) -> FaceMask:
     return keep
 
 
-def place(points: Points, faces: Faces, lattice: Lattice, *, cancel: str) -> PlacedMesh:
+def place(
+    welded: Welded, lattice: Lattice, *, cancel: str, report: TwoSetReport | None = None
+) -> PlacedMesh:
     """Express the faces that bound something in voxels of the lattice; see `bounding_faces`."""
-    keep = bounding_faces(points, faces, cancel=cancel)
+    points, faces, table = welded.points, welded.faces, welded.table
+    keep = bounding_faces(welded, cancel=cancel, report=report)
     face_ids = np.flatnonzero(keep).astype(np.int32)
-    faces = np.ascontiguousarray(faces[keep])
-    table = edge_table(faces, len(points))
+    if not keep.all():
+        faces = np.ascontiguousarray(faces[keep])
+        table = edge_table(faces, len(points))
     edge_line, line_ends = residual_edge_lines(faces, points, table=table)
     return PlacedMesh(lattice.to_local(points), faces, face_ids, table, edge_line, line_ends)

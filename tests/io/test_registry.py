@@ -6,7 +6,7 @@ import pytest
 import meshsdf.io
 from meshsdf.errors import IoError
 from meshsdf.grid import Grid
-from meshsdf.io import read_volume, write_volume
+from meshsdf.io import check_input, read_volume, write_volume
 from meshsdf.io.registry import FORMATS, format_of, kind_of, suffixes
 from meshsdf.io.volumes import probe_volume
 
@@ -59,3 +59,14 @@ def test_volumes_pass_through_by_suffix(tmp_path):
     assert probe_volume(path)["dtype"] == "float16"
     with pytest.raises(IoError, match="the output exists"):
         write_volume(path, Grid(np.ones((2, 2, 2)), 1.0, np.zeros(3)))
+
+
+def test_an_input_is_judged_before_it_is_read(tmp_path):
+    (tmp_path / "bunny.obj").write_text("")
+    check_input(tmp_path / "bunny.obj", kind="mesh")
+    with pytest.raises(IoError, match=r"did you mean .*bunny\.obj\?"):
+        check_input(tmp_path / "buny.obj")
+    with pytest.raises(IoError, match="this is a folder"):
+        check_input(tmp_path)
+    with pytest.raises(IoError, match="that is a mesh"):
+        check_input(tmp_path / "bunny.obj", kind="volume")

@@ -8,7 +8,6 @@ import pytest
 
 from meshsdf.errors import MemoryLimitError
 from meshsdf.mesh import Mesh
-from meshsdf.mesh.measures import area_vectors
 from meshsdf.mesh.primitives import box_mesh, icosphere
 from meshsdf.mesh.tubes import torus, trefoil_tube
 from meshsdf.sdf import mesh_to_band
@@ -24,7 +23,6 @@ PEAK = """
 import resource
 from meshsdf import mesh_to_band
 from meshsdf.mesh import Mesh
-from meshsdf.mesh.measures import area_vectors
 from meshsdf.mesh.primitives import icosphere
 from meshsdf.sdf.memory import band_bytes, estimate_bricks
 
@@ -36,7 +34,7 @@ mesh_to_band(mesh, resolution=16)
 with open("/proc/self/statm") as file:
     before = int(file.read().split()[1]) * resource.getpagesize()
 band = mesh_to_band(mesh, resolution=900)
-n_bricks = estimate_bricks(area_vectors(mesh), mesh.box.size, band.voxel_size, 3.0)
+n_bricks = estimate_bricks(mesh, band.voxel_size, 3.0)
 print(band_bytes(n_bricks, mesh.n_faces, closest=False) / (peak() - before))
 """
 
@@ -49,7 +47,7 @@ print(band_bytes(n_bricks, mesh.n_faces, closest=False) / (peak() - before))
 @pytest.mark.parametrize("half_width", [2.0, 3.0, 6.0])
 def test_the_number_of_bricks_is_foreseen(mesh, half_width):
     band = mesh_to_band(mesh, resolution=200, half_width=half_width)
-    foreseen = estimate_bricks(area_vectors(mesh), mesh.box.size, band.voxel_size, half_width)
+    foreseen = estimate_bricks(mesh, band.voxel_size, half_width)
     assert abs(foreseen / band.index.n_bricks - 1) < WITHIN
 
 
@@ -68,4 +66,4 @@ def test_what_does_not_fit_is_refused_with_both_numbers():
 
 
 def test_absurd_resolutions_are_foreseen_without_overflow():
-    assert estimate_bricks(np.eye(3), np.ones(3), 1e-200, 3.0) == np.inf
+    assert estimate_bricks(icosphere(1.0), 1e-200, 3.0) == np.inf
