@@ -22,19 +22,21 @@ import numpy as np
 from numba import njit
 
 from .brick_lookup import find_brick
-from .clip import clip_line, clip_segment, triangle_range
+from .clip import add_half_space, clip_row, clip_rows, clip_segment, triangle_range
 from .point_triangle import closest_on_triangle
 
 SLIVER = 1e-5  # altitude / longest edge
 FACE_SLACK = 1e-8  # voxels; covers prisms that part by less than a flat edge's wedge
 FLAT_EDGE = 1e-9  # sine of the wedge angle below which the two prisms cover the wedge
 SLACK = 1e-6  # voxels; generous, since edges and vertices measure the true distance
-MAX_FACES = 16  # half-spaces used per edge; leaving some out only widens the region
+MAX_FACES = 16  # half-spaces used per edge or vertex; leaving some out only widens the region
+SMALL = 4.0  # voxels; shorter features are bounded by their boxes along a line
 
 
 @njit(cache=True, nogil=True)
 def scan_faces(points, faces, ids, reach, x0, x1, root, pages, slot0, squared, nearest):
     """Scan the prisms of the faces ``ids`` over the nodes with x in [x0, x1)."""
+    planes = np.empty((5, 4))
     for n in range(len(ids)):
         f = ids[n]
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
@@ -42,43 +44,46 @@ def scan_faces(points, faces, ids, reach, x0, x1, root, pages, slot0, squared, n
         if area <= SLIVER * longest * longest:
             _scan_sliver(a, b, c, f, reach, x0, x1, root, pages, slot0, squared, nearest)
             continue
-        # Planes through the edges, normals in the face and pointing out of it
-        px, py, pz = _edge_plane(a, b, nx, ny, nz)
-        qx, qy, qz = _edge_plane(b, c, nx, ny, nz)
-        rx, ry, rz = _edge_plane(c, a, nx, ny, nz)
-        size = longest + reach
-        slack = FACE_SLACK + 1e-15 * size * longest * longest / area
-        grow_x, grow_y, grow_z = reach * abs(nx), reach * abs(ny), reach * abs(nz)
-        z_low = min(a[2], b[2], c[2]) - grow_z - slack
-        z_high = max(a[2], b[2], c[2]) + grow_z + slack
-        x_first = max(x0, np.int64(np.ceil(min(a[0], b[0], c[0]) - grow_x - slack)))
-        x_last = min(x1 - 1, np.int64(np.floor(max(a[0], b[0], c[0]) + grow_x + slack)))
+        slack = FACE_SLACK + 1e-15 * (longest + reach) * longest * longest / area
+        # The prism, relative to corner a: inside its three edges, within reach of its plane
+        k = _add_edge_plane(planes, 0, a, b, a, nx, ny, nz, slack)
+        k = _add_edge_plane(planes, k, b, c, a, nx, ny, nz, slack)
+        k = _add_edge_plane(planes, k, c, a, a, nx, ny, nz, slack)
+        k = add_half_space(planes, k, nx, ny, nz, reach)
+        k = add_half_space(planes, k, -nx, -ny, -nz, reach)
+        grow_x, grow_y = reach * abs(nx) + slack, reach * abs(ny) + slack
+        grow_z = reach * abs(nz) + slack
+        x_min, x_max = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
+        y_min, y_max = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
+        z_min = min(a[2], b[2], c[2]) - grow_z - a[2]
+        z_max = max(a[2], b[2], c[2]) + grow_z - a[2]
+        small = longest < SMALL and abs(nx) > 0.05
+        lean = ny / nx if small else 0.0
+        x_first = max(x0, np.int64(np.ceil(x_min - grow_x)))
+        x_last = min(x1 - 1, np.int64(np.floor(x_max + grow_x)))
         for x in range(x_first, x_last + 1):
-            y_low, y_high = triangle_range(
-                a[0], a[1], b[0], b[1], c[0], c[1], x - grow_x - slack, x + grow_x + slack
-            )
+            if small:
+                # The prism leans with the normal: y = y of a corner + lean * (x - its x)
+                y0, y1 = lean * (x - x_max), lean * (x - x_min)
+                y_low = max(y_min + min(y0, y1), y_min - grow_y) - slack
+                y_high = min(y_max + max(y0, y1), y_max + grow_y) + slack
+            else:
+                y_low, y_high = triangle_range(
+                    a[0], a[1], b[0], b[1], c[0], c[1], x - grow_x, x + grow_x
+                )
+                y_low, y_high = y_low - grow_y, y_high + grow_y
             if y_low > y_high:
                 continue
-            y_first = np.int64(np.ceil(y_low - grow_y - slack))
-            y_last = np.int64(np.floor(y_high + grow_y + slack))
-            for y in range(y_first, y_last + 1):
-                offset = px * (x - a[0]) + py * (y - a[1]) - pz * a[2]
-                low, high = clip_line(z_low, z_high, offset, pz, slack)
-                offset = qx * (x - b[0]) + qy * (y - b[1]) - qz * b[2]
-                low, high = clip_line(low, high, offset, qz, slack)
-                offset = rx * (x - c[0]) + ry * (y - c[1]) - rz * c[2]
-                low, high = clip_line(low, high, offset, rz, slack)
-                if low > high:
-                    continue
-                plane = nx * (x - a[0]) + ny * (y - a[1])
-                low, high = clip_line(low, high, plane - nz * a[2], nz, reach)
-                low, high = clip_line(low, high, nz * a[2] - plane, -nz, reach)
+            for y in range(np.int64(np.ceil(y_low)), np.int64(np.floor(y_high)) + 1):
+                low, high = clip_row(planes, k, x - a[0], y - a[1], z_min, z_max)
                 if low > high:
                     continue
                 slot = np.int32(-1)
                 brick = np.int64(-1)
                 node = ((x & 7) << 6) | ((y & 7) << 3)
-                for z in range(np.int64(np.ceil(low)), np.int64(np.floor(high)) + 1):
+                plane = nx * (x - a[0]) + ny * (y - a[1])
+                z_last = np.int64(np.floor(high + a[2]))
+                for z in range(np.int64(np.ceil(low + a[2])), z_last + 1):
                     if z >> 3 != brick:
                         brick = z >> 3
                         slot = find_brick(root, pages, x >> 3, y >> 3, brick)
@@ -93,87 +98,54 @@ def scan_edges(
 ):
     """Scan the wedges of the edges ``ids``; edge e has half-edges ``order[first[e]:...]``."""
     inward = np.empty((MAX_FACES, 3))
+    planes = np.empty((MAX_FACES + 2, 4))
+    hull = np.empty(6)
     for n in range(len(ids)):
         e = ids[n]
         a, b = points[ends[e, 0]], points[ends[e, 1]]
-        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        length = np.sqrt(ux * ux + uy * uy + uz * uz)
+        lx, ly, lz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        length = np.sqrt(lx * lx + ly * ly + lz * lz)
         if length == 0.0:
             continue  # its ends differ by less than rounding, and are scanned as vertices
-        ux, uy, uz = ux / length, uy / length, uz / length
-        # Directions from the edge into its faces
-        f = faces.shape[0]
-        n_in = 0
-        for i in range(first[e], first[e + 1]):
-            face = order[i] // 3
-            f = min(f, face)
-            _, _, _, area, longest = _normal(
-                points[faces[face, 0]], points[faces[face, 1]], points[faces[face, 2]]
-            )
-            if area <= SLIVER * longest * longest or n_in == MAX_FACES:
-                continue
-            o = points[faces[face, (order[i] % 3 + 2) % 3]]
-            wx, wy, wz = o[0] - a[0], o[1] - a[1], o[2] - a[2]
-            along = wx * ux + wy * uy + wz * uz
-            wx, wy, wz = wx - along * ux, wy - along * uy, wz - along * uz
-            scale = 1.0 / np.sqrt(wx * wx + wy * wy + wz * wz)
-            inward[n_in, 0], inward[n_in, 1], inward[n_in, 2] = wx * scale, wy * scale, wz * scale
-            n_in += 1
-        reach_x0, reach_x1 = -reach, reach
-        reach_y0, reach_y1 = -reach, reach
-        reach_z0, reach_z1 = -reach, reach
-        if n_in == 2 and first[e + 1] - first[e] == 2:
-            p, q = inward[0], inward[1]
-            # Rays that bound the wedge: across the edge, along each face's normal
-            rx, ry, rz = uy * p[2] - uz * p[1], uz * p[0] - ux * p[2], ux * p[1] - uy * p[0]
-            sx, sy, sz = uy * q[2] - uz * q[1], uz * q[0] - ux * q[2], ux * q[1] - uy * q[0]
-            sine = rx * q[0] + ry * q[1] + rz * q[2]
-            facing = p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-            if facing < 0.0 and abs(sine) < FLAT_EDGE:
-                continue
-            if sine > 0.0:
-                rx, ry, rz = -rx, -ry, -rz
-            if sx * p[0] + sy * p[1] + sz * p[2] > 0.0:
-                sx, sy, sz = -sx, -sy, -sz
-            if facing < -0.5:
-                # The wedge opens by less than 60 degrees: its hull is small
-                stretch = reach / np.sqrt(0.5 * (1.0 + rx * sx + ry * sy + rz * sz)) + SLACK
-                reach_x0 = min(0.0, stretch * rx, stretch * sx) - SLACK
-                reach_x1 = max(0.0, stretch * rx, stretch * sx) + SLACK
-                reach_y0 = min(0.0, stretch * ry, stretch * sy) - SLACK
-                reach_y1 = max(0.0, stretch * ry, stretch * sy) + SLACK
-                reach_z0 = min(0.0, stretch * rz, stretch * sz) - SLACK
-                reach_z1 = max(0.0, stretch * rz, stretch * sz) + SLACK
-        lx, ly, lz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        x_first = max(x0, np.int64(np.ceil(min(a[0], b[0]) + reach_x0)))
-        x_last = min(x1 - 1, np.int64(np.floor(max(a[0], b[0]) + reach_x1)))
+        ux, uy, uz = lx / length, ly / length, lz / length
+        n_in, f = _into_faces(points, faces, order, first[e], first[e + 1], a, ux, uy, uz, inward)
+        n_faces = first[e + 1] - first[e]
+        if not _wedge_hull(inward, n_in == 2 and n_faces == 2, ux, uy, uz, reach, hull):
+            continue
+        # The wedge, relative to end a: outside its faces, between its ends
+        k = 0
+        for i in range(n_in):
+            k = add_half_space(planes, k, inward[i, 0], inward[i, 1], inward[i, 2], SLACK)
+        k = add_half_space(planes, k, ux, uy, uz, length + SLACK)
+        k = add_half_space(planes, k, -ux, -uy, -uz, SLACK)
+        small = length < SMALL
+        x_first = max(x0, np.int64(np.ceil(min(a[0], b[0]) + hull[0])))
+        x_last = min(x1 - 1, np.int64(np.floor(max(a[0], b[0]) + hull[1])))
+        t0, t1, s0, s1 = 0.0, 1.0, 0.0, 1.0
         for x in range(x_first, x_last + 1):
-            t0, t1 = clip_segment(0.0, 1.0, a[0], lx, x - reach_x1, x - reach_x0)
-            if t0 > t1:
-                continue
-            y0, y1 = a[1] + t0 * ly, a[1] + t1 * ly
-            y_first = np.int64(np.ceil(min(y0, y1) + reach_y0))
-            y_last = np.int64(np.floor(max(y0, y1) + reach_y1))
-            for y in range(y_first, y_last + 1):
-                s0, s1 = clip_segment(t0, t1, a[1], ly, y - reach_y1, y - reach_y0)
-                if s0 > s1:
+            if not small:
+                t0, t1 = clip_segment(0.0, 1.0, a[0], lx, x - hull[1], x - hull[0])
+                if t0 > t1:
                     continue
-                z0, z1 = a[2] + s0 * lz, a[2] + s1 * lz
-                low, high = min(z0, z1) + reach_z0, max(z0, z1) + reach_z1
+            y0, y1 = a[1] + t0 * ly, a[1] + t1 * ly
+            y_first = np.int64(np.ceil(min(y0, y1) + hull[2]))
+            y_last = np.int64(np.floor(max(y0, y1) + hull[3]))
+            for y in range(y_first, y_last + 1):
+                if not small:
+                    s0, s1 = clip_segment(t0, t1, a[1], ly, y - hull[3], y - hull[2])
+                    if s0 > s1:
+                        continue
+                z0, z1 = s0 * lz, s1 * lz
                 wx, wy = x - a[0], y - a[1]
-                for i in range(n_in):
-                    m = inward[i]
-                    offset = m[0] * wx + m[1] * wy - m[2] * a[2]
-                    low, high = clip_line(low, high, offset, m[2], SLACK)
-                offset = ux * wx + uy * wy - uz * a[2]
-                low, high = clip_line(low, high, offset, uz, length + SLACK)
-                low, high = clip_line(low, high, -offset, -uz, SLACK)
+                low, high = min(z0, z1) + hull[4], max(z0, z1) + hull[5]
+                low, high = clip_row(planes, k, wx, wy, low, high)
                 if low > high:
                     continue
                 slot = np.int32(-1)
                 brick = np.int64(-1)
                 node = ((x & 7) << 6) | ((y & 7) << 3)
-                for z in range(np.int64(np.ceil(low)), np.int64(np.floor(high)) + 1):
+                z_last = np.int64(np.floor(high + a[2]))
+                for z in range(np.int64(np.ceil(low + a[2])), z_last + 1):
                     if z >> 3 != brick:
                         brick = z >> 3
                         slot = find_brick(root, pages, x >> 3, y >> 3, brick)
@@ -204,53 +176,106 @@ def scan_vertices(
     nearest,
 ):
     """Scan the cones of the vertices ``ids``; vertex v touches ``edges[start[v]:start[v + 1]]``."""
-    away = np.empty((MAX_FACES, 3))
+    planes = np.empty((MAX_FACES, 4))
+    lows, highs = np.empty(8), np.empty(8)
     for n in range(len(ids)):
         v = ids[n]
         p = points[v]
         f = order[first[edges[start[v]]]] // 3
-        n_away = 0
+        k = 0
         for i in range(start[v], start[v + 1]):
             e = edges[i]
             f = min(f, order[first[e]] // 3)
-            if n_away == MAX_FACES:
+            if k == MAX_FACES:
                 continue
             q = points[ends[e, 0] + ends[e, 1] - v]
             dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
             length = np.sqrt(dx * dx + dy * dy + dz * dz)
             if length == 0.0:
                 continue
-            scale = 1.0 / length
-            away[n_away, 0], away[n_away, 1], away[n_away, 2] = dx * scale, dy * scale, dz * scale
-            n_away += 1
+            k = add_half_space(planes, k, dx / length, dy / length, dz / length, SLACK)
         x_first = max(x0, np.int64(np.ceil(p[0] - reach)))
         x_last = min(x1 - 1, np.int64(np.floor(p[0] + reach)))
         for x in range(x_first, x_last + 1):
             wx = x - p[0]
             disc = np.sqrt(max(0.0, reach * reach - wx * wx))
-            for y in range(np.int64(np.ceil(p[1] - disc)), np.int64(np.floor(p[1] + disc)) + 1):
-                wy = y - p[1]
-                high = np.sqrt(max(0.0, reach * reach - wx * wx - wy * wy))
-                low = -high
-                for i in range(n_away):
-                    d = away[i]
-                    low, high = clip_line(low, high, d[0] * wx + d[1] * wy, d[2], SLACK)
+            y_last = np.int64(np.floor(p[1] + disc))
+            for y_first in range(np.int64(np.ceil(p[1] - disc)), y_last + 1, 8):
+                lows[:] = -reach
+                highs[:] = reach
+                clip_rows(planes, k, wx, y_first - p[1], lows, highs)
+                for y in range(y_first, min(y_first + 8, y_last + 1)):
+                    low, high = lows[y - y_first], highs[y - y_first]
                     if low > high:
-                        break
-                if low > high:
-                    continue
-                slot = np.int32(-1)
-                brick = np.int64(-1)
-                node = ((x & 7) << 6) | ((y & 7) << 3)
-                z_last = np.int64(np.floor(p[2] + high))
-                for z in range(np.int64(np.ceil(p[2] + low)), z_last + 1):
-                    if z >> 3 != brick:
-                        brick = z >> 3
-                        slot = find_brick(root, pages, x >> 3, y >> 3, brick)
-                    if slot >= 0:
-                        wz = z - p[2]
-                        distance = wx * wx + wy * wy + wz * wz
-                        _keep(squared, nearest, slot - slot0, node | (z & 7), distance, f)
+                        continue
+                    wy = y - p[1]
+                    slot = np.int32(-1)
+                    brick = np.int64(-1)
+                    node = ((x & 7) << 6) | ((y & 7) << 3)
+                    z_last = np.int64(np.floor(p[2] + high))
+                    for z in range(np.int64(np.ceil(p[2] + low)), z_last + 1):
+                        if z >> 3 != brick:
+                            brick = z >> 3
+                            slot = find_brick(root, pages, x >> 3, y >> 3, brick)
+                        if slot >= 0:
+                            wz = z - p[2]
+                            distance = wx * wx + wy * wy + wz * wz
+                            _keep(squared, nearest, slot - slot0, node | (z & 7), distance, f)
+
+
+@njit(cache=True, nogil=True)
+def _into_faces(points, faces, order, begin, end, a, ux, uy, uz, inward):
+    """Unit directions from an edge into its faces; returns how many, and the lowest face."""
+    f = order[begin] // 3
+    n = 0
+    for i in range(begin, end):
+        face = order[i] // 3
+        f = min(f, face)
+        if n == len(inward):
+            continue
+        p, q, r = points[faces[face, 0]], points[faces[face, 1]], points[faces[face, 2]]
+        _, _, _, area, longest = _normal(p, q, r)
+        if area <= SLIVER * longest * longest:
+            continue
+        o = points[faces[face, (order[i] % 3 + 2) % 3]]
+        wx, wy, wz = o[0] - a[0], o[1] - a[1], o[2] - a[2]
+        along = wx * ux + wy * uy + wz * uz
+        wx, wy, wz = wx - along * ux, wy - along * uy, wz - along * uz
+        scale = 1.0 / np.sqrt(wx * wx + wy * wy + wz * wz)
+        inward[n, 0], inward[n, 1], inward[n, 2] = wx * scale, wy * scale, wz * scale
+        n += 1
+    return n, f
+
+
+@njit(cache=True, nogil=True)
+def _wedge_hull(inward, is_regular, ux, uy, uz, reach, hull):
+    """Fill the box (x0, x1, y0, y1, z0, z1) of a wedge's cross-section; False if it is flat."""
+    hull[0] = hull[2] = hull[4] = -reach
+    hull[1] = hull[3] = hull[5] = reach
+    if not is_regular:
+        return True
+    p, q = inward[0], inward[1]
+    # Rays that bound the wedge: across the edge, along each face's normal
+    rx, ry, rz = uy * p[2] - uz * p[1], uz * p[0] - ux * p[2], ux * p[1] - uy * p[0]
+    sx, sy, sz = uy * q[2] - uz * q[1], uz * q[0] - ux * q[2], ux * q[1] - uy * q[0]
+    sine = rx * q[0] + ry * q[1] + rz * q[2]
+    facing = p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+    if facing < 0.0 and abs(sine) < FLAT_EDGE:
+        return False
+    if facing < -0.5:
+        # The wedge opens by less than 60 degrees: its hull is small
+        if sine > 0.0:
+            rx, ry, rz = -rx, -ry, -rz
+        if sx * p[0] + sy * p[1] + sz * p[2] > 0.0:
+            sx, sy, sz = -sx, -sy, -sz
+        stretch = reach / np.sqrt(0.5 * (1.0 + rx * sx + ry * sy + rz * sz)) + SLACK
+        hull[0] = min(0.0, stretch * rx, stretch * sx) - SLACK
+        hull[1] = max(0.0, stretch * rx, stretch * sx) + SLACK
+        hull[2] = min(0.0, stretch * ry, stretch * sy) - SLACK
+        hull[3] = max(0.0, stretch * ry, stretch * sy) + SLACK
+        hull[4] = min(0.0, stretch * rz, stretch * sz) - SLACK
+        hull[5] = max(0.0, stretch * rz, stretch * sz) + SLACK
+    return True
 
 
 @njit(cache=True, nogil=True)
@@ -317,9 +342,11 @@ def _normal(a, b, c):
 
 
 @njit(cache=True, nogil=True)
-def _edge_plane(p, q, nx, ny, nz):
-    """Unit normal of the plane through edge pq across the face, pointing out of the face."""
+def _add_edge_plane(planes, k, p, q, origin, nx, ny, nz, slack):
+    """Add the half-space inside edge pq of a face with normal n, relative to ``origin``."""
     ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     mx, my, mz = uy * nz - uz * ny, uz * nx - ux * nz, ux * ny - uy * nx
     scale = 1.0 / np.sqrt(mx * mx + my * my + mz * mz)
-    return mx * scale, my * scale, mz * scale
+    mx, my, mz = mx * scale, my * scale, mz * scale
+    offset = mx * (p[0] - origin[0]) + my * (p[1] - origin[1]) + mz * (p[2] - origin[2])
+    return add_half_space(planes, k, mx, my, mz, offset + slack)

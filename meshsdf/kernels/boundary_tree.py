@@ -20,7 +20,7 @@ numbers for soups and clouds", 2018, doi:10.1145/3197517.3201337 (the expansion,
 import numpy as np
 from numba import njit
 
-LEAF_EDGES = 4
+LEAF_EDGES = 8
 N_COLUMNS = 22
 
 # Columns of a tree node's floats

@@ -25,10 +25,8 @@ from numba import njit
 
 from .boundary_tree import (
     AREA,
-    FAN_AREA,
     HIGH,
     HUB,
-    LENGTH,
     LOW,
     MOMENT,
     RADIUS,
@@ -39,6 +37,7 @@ from .crossings import edge_height
 NEAR_LINE = 1e-6  # voxels; far above the rounding of local coordinates, far below a voxel
 BESIDE = 1e-150  # stands for an infinitely small step; its square is still a float
 TURN = 2.0 * np.pi
+TINY, HUGE = 1e-30, 1e30  # LEAF_EDGES numbers between these have a product that is a float
 
 
 @njit(cache=True, nogil=True)
@@ -75,9 +74,22 @@ def _rule_turn(points, v, w, line, line_ends, a, b, cross, dot, p):
 
 
 @njit(cache=True, nogil=True)
+def _angle(cross, dot):
+    """Argument of dot + i cross in (-pi, pi]."""
+    if cross == 0.0:
+        return np.pi if dot < 0.0 else 0.0
+    return np.arctan2(cross, dot)
+
+
+@njit(cache=True, nogil=True)
 def _sum_edges(points, chain, chain_line, line_ends, first, last, p):
-    """Turns of W due to the edges first ... last - 1, near the vertical line through p or not."""
+    """Turns of W due to the edges first ... last - 1, near the vertical line through p or not.
+
+    Numbers are multiplied rather than arguments added; a turn is counted whenever the product
+    passes the negative real axis.
+    """
     angle, turns = 0.0, 0
+    re, im = 1.0, 0.0
     before = -1
     b = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for e in range(first, last):
@@ -87,14 +99,22 @@ def _sum_edges(points, chain, chain_line, line_ends, first, last, p):
         before = w
         cross = a[3] * b[4] - a[4] * b[3]
         dot = a[5] * b[5] + a[3] * b[3] + a[4] * b[4]
-        angle += np.arctan2(cross, dot) if cross != 0.0 else (np.pi if dot < 0.0 else 0.0)
+        if TINY < abs(cross) + abs(dot) < HUGE:
+            new_re, new_im = re * dot - im * cross, re * cross + im * dot
+            if im >= 0.0 and cross >= 0.0:
+                turns += (re < 0.0 and dot < 0.0) or new_im < 0.0
+            elif im < 0.0 and cross < 0.0:
+                turns -= (re < 0.0 and dot < 0.0) or new_im > 0.0 or (new_im == 0.0 > new_re)
+            re, im = new_re, new_im
+        else:
+            angle += _angle(cross, dot)
         if (
             min(a[0], b[0]) <= 0.0 <= max(a[0], b[0])
             and min(a[1], b[1]) <= NEAR_LINE
             and max(a[1], b[1]) >= -NEAR_LINE
         ):
             turns += _rule_turn(points, v, w, chain_line[e], line_ends, a, b, cross, dot, p)
-    return angle / TURN + turns
+    return (angle + _angle(im, re)) / TURN + turns
 
 
 @njit(cache=True, nogil=True)
@@ -149,69 +169,3 @@ def boundary_term(boundary, p, tolerance):
         else:
             n += 1
     return total, error
-
-
-@njit(cache=True, nogil=True)
-def _segment_distance(a, b, p):
-    """Distance from p to segment ab."""
-    wx, wy, wz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
-    squared = wx * wx + wy * wy + wz * wz
-    t = (x * wx + y * wy + z * wz) / squared if squared > 0.0 else 0.0
-    t = min(max(t, 0.0), 1.0)
-    x, y, z = x - t * wx, y - t * wy, z - t * wz
-    return np.sqrt(x * x + y * y + z * z)
-
-
-@njit(cache=True, nogil=True)
-def variation(boundary, p, half, limit):
-    """Bound how far the boundary term may be from its value at p in the cube p +- half.
-
-    Returns infinity once the bound exceeds ``limit`` or where the cube meets a curtain: the term
-    jumps there. Elsewhere its gradient is that of the magnetic potential of a current along the
-    boundary (Biot, Savart): at distance d an edge of length L adds at most min(L / d, 2) / d to
-    4 pi |grad W|; a closed chain whose fan has the area S, at most 2 S / d^3.
-    """
-    points, chain, _, _, nodes, data = boundary
-    reach = half * np.sqrt(3.0)
-    scale = reach / (2.0 * TURN)
-    total = 0.0
-    n = 0
-    while n < len(nodes):
-        node = data[n]
-        curtain = (
-            abs(node[HUB] - p[0]) <= 0.5 * (node[HIGH] - node[LOW]) + half + NEAR_LINE
-            and abs(node[HUB + 1] - p[1])
-            <= 0.5 * (node[HIGH + 1] - node[LOW + 1]) + half + NEAR_LINE
-            and node[LOW + 2] <= p[2] + half + NEAR_LINE
-        )
-        x, y, z = node[HUB] - p[0], node[HUB + 1] - p[1], node[HUB + 2] - p[2]
-        d = np.sqrt(x * x + y * y + z * z) - node[RADIUS] - reach
-        if not curtain and d > node[RADIUS]:
-            slope = node[LENGTH] / (d * d)
-            if nodes[n, 4] == 0:
-                slope = min(slope, 2.0 * node[FAN_AREA] / (d * d * d))
-            total += scale * slope
-            n = nodes[n, 2]
-        elif nodes[n, 3] == 1:
-            for e in range(nodes[n, 0], nodes[n, 1]):
-                a, b = points[chain[e, 0]], points[chain[e, 1]]
-                if (
-                    min(a[0], b[0]) <= p[0] + half + NEAR_LINE
-                    and max(a[0], b[0]) >= p[0] - half - NEAR_LINE
-                    and min(a[1], b[1]) <= p[1] + half + NEAR_LINE
-                    and max(a[1], b[1]) >= p[1] - half - NEAR_LINE
-                    and min(a[2], b[2]) <= p[2] + half + NEAR_LINE
-                ):
-                    return np.inf
-                d = _segment_distance(a, b, p) - reach
-                if d <= 0.0:
-                    return np.inf
-                length = np.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-                total += scale * min(length / d, 2.0) / d
-            n = nodes[n, 2]
-        else:
-            n += 1
-        if total > limit:
-            return np.inf
-    return total

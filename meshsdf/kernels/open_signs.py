@@ -1,18 +1,26 @@
 """Decide for the nodes of bricks whether the winding number exceeds 1/2 in magnitude.
 
-A block of nodes that no curtain meets shares one evaluation of the boundary term: where its value
-at the centre is farther from every half that matters than the term may vary in the block, all
-nodes are decided. Blocks are bricks, then eighths of bricks, then nodes. A node is evaluated with
-expansions; if their bound leaves the answer open, with finer ones, and in the end exactly.
+Within a block of nodes away from the boundary the boundary term is linear up to a known bound, so
+one evaluation at its centre does for all nodes at which the winding number is not that close to
+1/2. Where a curtain passes the term jumps from one vertical line to the next, so each line of
+nodes is evaluated once. Blocks have 8, 4, 2 nodes a side. A node is evaluated
+with expansions; if their bound leaves the answer open, with finer ones, and in the end exactly.
 """
 
 import numpy as np
 from numba import njit
 
-from .boundary_winding import boundary_term, variation
+from .boundary_change import change
+from .boundary_winding import boundary_term
 
 COARSE = 2e-4  # error allowed per expansion, in units of W
 FINE = 1e-8
+# Along a line through the cube the slope at the centre is off by the derivative's bound times the
+# half diagonal; over half a side that is 2 / sqrt(3) of the bound for points and centre
+ALONG_LINE = 1.16
+QUICK = 0.3, 0.05  # change up to which a block is tried as a whole; that of one tree node
+SMALL = 2e-4  # change of W below which a tree node is not looked into, for the linear model
+BENT = (0.06, 0.15, 0.25)  # change beyond the linear model for which 8^3, 4^3, 2^3 are cut
 
 
 @njit(cache=True, nogil=True)
@@ -38,42 +46,34 @@ def sum_upwards(coordinates, crossings, top):
 
 
 @njit(cache=True, nogil=True)
+def _is_clear(wound, error, membrane):
+    """An error of W does not change on which side of 1/2 and of 1/2 +- membrane |W| lies."""
+    off = abs(abs(wound) - 0.5)
+    return off > error and abs(off - membrane) > error
+
+
+@njit(cache=True, nogil=True)
 def _winding(boundary, p, count, membrane):
     """W at p, exact enough to compare its magnitude with 1/2 and with 1/2 +- membrane."""
     value, error = boundary_term(boundary, p, COARSE)
-    off = abs(abs(count + value) - 0.5)
-    if off <= error or abs(off - membrane) <= error:
+    if not _is_clear(count + value, error, membrane):
         value, error = boundary_term(boundary, p, FINE)
-        off = abs(abs(count + value) - 0.5)
-        if off <= error or abs(off - membrane) <= error:
+        if not _is_clear(count + value, error, membrane):
             value, error = boundary_term(boundary, p, 0.0)
     return count + value
 
 
 @njit(cache=True, nogil=True)
-def _settle_block(boundary, corner, first, side, counts, membrane, inside):
-    """Decide a block of side^3 nodes at once; False where that cannot be done."""
-    half = 0.5 * (side - 1)
-    p = (
-        float(corner[0] + first[0]) + half,
-        float(corner[1] + first[1]) + half,
-        float(corner[2] + first[2]) + half,
-    )
-    low, high = counts[0], counts[0]
-    low = counts[64 * first[0] + 8 * first[1] + first[2]]
-    high = low
+def _settle_evenly(counts, first, side, value, error, membrane, inside):
+    """Decide a block whose term is value +- error, if its counts leave all nodes clear."""
+    low = high = counts[64 * first[0] + 8 * first[1] + first[2]]
     for i in range(first[0], first[0] + side):
         for j in range(first[1], first[1] + side):
             for k in range(first[2], first[2] + side):
                 count = counts[64 * i + 8 * j + k]
                 low, high = min(low, count), max(high, count)
-    spread = variation(boundary, p, half, 0.5 - membrane)
-    if spread == np.inf:
-        return False
-    value, error = boundary_term(boundary, p, COARSE)
-    spread += error
     for count in range(low, high + 1):
-        if abs(abs(count + value) - 0.5) <= spread + membrane:
+        if abs(abs(count + value) - 0.5) <= error + membrane:
             return False
     for i in range(first[0], first[0] + side):
         for j in range(first[1], first[1] + side):
@@ -84,6 +84,80 @@ def _settle_block(boundary, corner, first, side, counts, membrane, inside):
 
 
 @njit(cache=True, nogil=True)
+def _settle_block(boundary, corner, first, side, counts, membrane, inside):
+    """Decide a block of side^3 nodes; return how many are uncertain, -1 if it must be cut."""
+    half = 0.5 * (side - 1)
+    x, y = float(corner[0] + first[0]), float(corner[1] + first[1])
+    z = float(corner[2] + first[2]) + half
+    center = (x + half, y + half, z)
+    value, error = 0.0, np.inf
+    _, spread, linear, is_cut = change(boundary, center, half, QUICK[0], QUICK[1])
+    if spread + linear < 0.5 - membrane and not is_cut:
+        value, error = boundary_term(boundary, center, COARSE)
+        spread += linear + error
+        if _settle_evenly(counts, first, side, value, spread, membrane, inside):
+            return 0
+    limit = BENT[0] if side == 8 else BENT[1] if side == 4 else BENT[2]
+    slope, bent, linear, is_cut = change(boundary, center, half, limit, SMALL)
+    if bent == np.inf:
+        return -1
+    if not is_cut:
+        if error == np.inf:
+            value, error = boundary_term(boundary, center, COARSE)
+        spread = bent + linear + error
+        if _settle_evenly(counts, first, side, value, spread, membrane, inside):
+            return 0
+    else:
+        bent *= ALONG_LINE
+    uncertain = 0
+    for i in range(side):
+        for j in range(side):
+            at = value + slope[0] * (i - half) + slope[1] * (j - half)
+            if is_cut:
+                at, error = boundary_term(boundary, (x + i, y + j, z), COARSE)
+            for k in range(side):
+                node = 64 * (first[0] + i) + 8 * (first[1] + j) + first[2] + k
+                wound = counts[node] + at + slope[2] * (k - half)
+                if not _is_clear(wound, bent + error, membrane):
+                    p = (x + i, y + j, z + (k - half))
+                    wound = _winding(boundary, p, counts[node], membrane)
+                inside[node] = abs(wound) > 0.5
+                uncertain += abs(abs(wound) - 0.5) < membrane
+    return uncertain
+
+
+@njit(cache=True, nogil=True)
+def _wind_eighth(boundary, corner, start, counts, membrane, inside):
+    """Decide 4^3 nodes: at once, by 2^3, or one by one; return how many are uncertain."""
+    n = _settle_block(boundary, corner, start, 4, counts, membrane, inside)
+    if n >= 0:
+        return n
+    uncertain = 0
+    for part in range(8):
+        i, j, k = _part(part, 2)
+        first = (start[0] + i, start[1] + j, start[2] + k)
+        n = _settle_block(boundary, corner, first, 2, counts, membrane, inside)
+        if n >= 0:
+            uncertain += n
+            continue
+        for single in range(8):
+            i, j, k = _part(single, 1)
+            i, j, k = first[0] + i, first[1] + j, first[2] + k
+            node = 64 * i + 8 * j + k
+            p = (float(corner[0] + i), float(corner[1] + j), float(corner[2] + k))
+            wound = abs(_winding(boundary, p, counts[node], membrane))
+            inside[node] = wound > 0.5
+            uncertain += abs(wound - 0.5) < membrane
+    return uncertain
+
+
+@njit(cache=True, nogil=True)
+def _part(number, side):
+    """First node of one of the eight cubes that make up a cube."""
+    return side * (number >> 2), side * ((number >> 1) & 1), side * (number & 1)
+
+
+@njit(cache=True, nogil=True)
 def wind_bricks(boundary, coordinates, counts, membrane, inside, uncertain):
     """Fill ``inside`` (b, 512) bool; ``uncertain[b]`` counts nodes with ||W| - 1/2| < membrane.
 
@@ -91,20 +165,14 @@ def wind_bricks(boundary, coordinates, counts, membrane, inside, uncertain):
     """
     for b in range(len(coordinates)):
         corner = (8 * coordinates[b, 0], 8 * coordinates[b, 1], 8 * coordinates[b, 2])
-        uncertain[b] = 0
-        if _settle_block(boundary, corner, (0, 0, 0), 8, counts[b], membrane, inside[b]):
-            continue
-        for eighth in range(8):
-            first = (4 * (eighth >> 2), 4 * ((eighth >> 1) & 1), 4 * (eighth & 1))
-            if _settle_block(boundary, corner, first, 4, counts[b], membrane, inside[b]):
-                continue
-            for n in range(64):
-                i, j, k = first[0] + (n >> 4), first[1] + ((n >> 2) & 3), first[2] + (n & 3)
-                node = 64 * i + 8 * j + k
-                p = (float(corner[0] + i), float(corner[1] + j), float(corner[2] + k))
-                wound = abs(_winding(boundary, p, counts[b, node], membrane))
-                inside[b, node] = wound > 0.5
-                uncertain[b] += abs(wound - 0.5) < membrane
+        n = _settle_block(boundary, corner, (0, 0, 0), 8, counts[b], membrane, inside[b])
+        uncertain[b] = max(n, 0)
+        if n < 0:
+            for eighth in range(8):
+                start = _part(eighth, 4)
+                uncertain[b] += _wind_eighth(
+                    boundary, corner, start, counts[b], membrane, inside[b]
+                )
 
 
 @njit(cache=True, nogil=True)
@@ -114,3 +182,21 @@ def wind_points(boundary, points, counts, wound):
         p = (points[n, 0], points[n, 1], points[n, 2])
         value, _ = boundary_term(boundary, p, 0.0)
         wound[n] = counts[n] + value
+
+
+@njit(cache=True, nogil=True)
+def mark_mixed_faces(inside, mixed):
+    """``mixed[b, f]``: nodes on face f (-x, +x, -y, +y, -z, +z) of brick b lie on both sides."""
+    for b in range(len(inside)):
+        for face in range(6):
+            axis, layer = face >> 1, 7 * (face & 1)
+            n = 0
+            for u in range(8):
+                for v in range(8):
+                    if axis == 0:
+                        n += inside[b, layer, u, v]
+                    elif axis == 1:
+                        n += inside[b, u, layer, v]
+                    else:
+                        n += inside[b, u, v, layer]
+            mixed[b, face] = 0 < n < 64

@@ -82,7 +82,7 @@ class BandBuilder:
         self.slabs = [(low + a, low + b) for a, b in ranges]
         edges = np.array([8.0 * low] + [8.0 * b for _, b in self.slabs])
         used = np.flatnonzero(np.diff(features.start)).astype(np.int32)
-        reach = self.half_width + 1.0
+        reach = self.half_width + 1e-3
         kinds = [features.ends, faces, used[:, None]]
         if self.closed is not self.placed:
             kinds.append(self.closed.faces)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Number
 from ..grid import BrickIndex, NarrowBand
-from ..grid.brick_index import BRICK
+from ..kernels.open_signs import mark_mixed_faces
 from ..progress import Progress
 from .lattice_winding import LatticeWinding
 from .memory import BYTES_PER_BRICK, require_memory
@@ -35,36 +35,46 @@ def sign_by_winding_number(
     at which it is nearer to 1/2 than 0.05.
     """
     winding = LatticeWinding(placed, band.index)
-    coordinates = band.index.coordinates
     inside, uncertain = winding.first_sides(progress)
-    n_uncertain = int(uncertain.sum())
-    while True:
-        grown = _across_mixed_faces(coordinates, inside)
-        if len(grown) == 0:
-            break
-        n = len(coordinates) + len(grown)
+    bricks, sides = [band.index.coordinates], [inside]
+    n_uncertain, n = int(uncertain.sum()), band.index.n_bricks
+    grown = _across_mixed_faces(bricks, inside, band.index)
+    while len(grown):
+        n += len(grown)
         require_memory(2 * n * BYTES_PER_BRICK, max_memory, where="mesh_to_band(...): openings")
-        more, uncertain = winding.sides(grown, progress)
+        inside, uncertain = winding.sides(grown, progress)
         n_uncertain += int(uncertain.sum())
-        coordinates = np.concatenate([coordinates, grown])
-        inside = np.concatenate([inside, more])
+        bricks.append(grown)
+        sides.append(inside)
+        grown = _across_mixed_faces(bricks, inside, band.index)
+    coordinates, inside = bricks[0], sides[0]
+    if len(bricks) > 1:
+        coordinates, inside = np.concatenate(bricks), np.concatenate(sides)
         order = np.lexsort(coordinates.T[::-1])
         coordinates, inside = coordinates[order], inside[order]
     inner = _inner_bricks(winding, coordinates)
     return _signed(band, coordinates, inner, inside, n_uncertain)
 
 
-def _across_mixed_faces(coordinates: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Missing bricks next to a brick face on which the sign changes, in lexicographic order."""
+def _across_mixed_faces(
+    bricks: list[np.ndarray], inside: np.ndarray, index: BrickIndex
+) -> np.ndarray:
+    """Bricks not yet known next to faces of the last of ``bricks`` on which the sign changes.
+
+    Known are those of the index and those that were grown: all of ``bricks``.
+    """
+    mixed = np.empty((len(inside), 6), np.bool_)
+    mark_mixed_faces(inside, mixed)
     found = []
-    for axis in range(3):
-        for side, step in ((0, -1), (BRICK - 1, 1)):
-            layer = inside.take(side, axis=axis + 1).reshape(len(inside), -1)
-            mixed = layer.any(axis=1) & ~layer.all(axis=1)
-            found.append(coordinates[mixed] + step * np.eye(3, dtype=np.int64)[axis])
+    for face in range(6):
+        step = (2 * (face & 1) - 1) * np.eye(3, dtype=np.int64)[face >> 1]
+        beyond = bricks[-1][mixed[:, face]] + step
+        found.append(beyond[index.lookup(beyond) < 0])
     candidates = np.unique(np.concatenate(found), axis=0)
-    known = BrickIndex.from_coordinates(coordinates)
-    return candidates[known.lookup(candidates) < 0]
+    if len(bricks) == 1 or len(candidates) == 0:
+        return candidates
+    grown = BrickIndex.from_coordinates(np.unique(np.concatenate(bricks[1:]), axis=0))
+    return candidates[grown.lookup(candidates) < 0]
 
 
 def _inner_bricks(winding: LatticeWinding, coordinates: np.ndarray) -> np.ndarray:
