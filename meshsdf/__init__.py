@@ -16,6 +16,7 @@ Conventions
 - The same input gives the same bytes, with any number of threads.
 
 >>> import numpy as np
+>>> from meshsdf import mesh_to_band
 >>> from meshsdf.mesh.primitives import box_mesh
 >>> band = mesh_to_band(box_mesh(size=(2.0, 2.0, 2.0)), voxel_size=0.25)
 >>> band.value_at(np.array([[0, 0, 5], [0, 0, 4], [0, 0, 3]]))

@@ -33,7 +33,8 @@ class NarrowBand:
     index : BrickIndex
         Which bricks exist; those that do not are outside or inside as a whole.
     values : (b, 8, 8, 8) float32
-        World units, negative inside; +-background at nodes that are not active.
+        World units, negative inside; +-background at nodes that are not active. An inner node at
+        distance 0 holds -2**-126, so that its sign is not lost.
     active : (b, 8) uint64
         Bit ``8 j + k`` of word i is set where node (i, j, k) of the brick is active, that is,
         nearer to the surface than the background.
@@ -139,7 +140,7 @@ class NarrowBand:
         """Return what scripts ask for: kind, voxel_size, shape, active_voxels, n_bricks, …"""
         low, high = self.active_box()
         facts = {
-            "kind": "narrow band",
+            "kind": "narrow_band",
             "voxel_size": self.voxel_size,
             "translation": self.translation.tolist(),
             "first_node": low.tolist(),
@@ -149,7 +150,7 @@ class NarrowBand:
             "active_voxels": self.n_active,
             "n_bricks": self.index.n_bricks,
             "sign": self.sign,
-            "has_closest_faces": self.closest_face is not None,
+            "has_closest_face": self.closest_face is not None,
         }
         if self.uncertain_voxels is not None:
             facts["uncertain_voxels"] = self.uncertain_voxels

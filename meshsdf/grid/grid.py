@@ -49,7 +49,7 @@ class Grid:
     def facts(self) -> dict:
         """Return what scripts ask for: kind, voxel_size, shape, active_voxels, …"""
         return {
-            "kind": "dense grid",
+            "kind": "grid",
             "voxel_size": self.voxel_size,
             "origin": self.origin.tolist(),
             "shape": list(self.values.shape),

@@ -101,7 +101,7 @@ def write_npz(
         _check_half(volume, where)
     arrays = _band_arrays(volume) if isinstance(volume, NarrowBand) else _grid_arrays(volume)
     if half:
-        arrays["values"] = arrays["values"].astype(np.float16)
+        arrays["values"] = _halved(arrays["values"])
     with atomic_write(path, force) as temporary:
         write_archive(temporary, arrays)
 
@@ -243,6 +243,12 @@ def _check_headers(headers: dict[str, ArrayHeader], kind: str) -> None:
         is_right = header.dtype.kind == "U" if dtypes == "text" else header.dtype.str in dtypes
         if not fits or not is_right:
             raise ValueError(f"{name!r} is {header.dtype.name} of shape {header.shape}")
+
+
+def _halved(values: np.ndarray) -> np.ndarray:
+    """Round to float16; an inner node at distance 0 keeps its sign as the least negative number."""
+    halves = values.astype(np.float16)
+    return np.where((values < 0) & (halves == 0), np.float16(-(2.0**-24)), halves)
 
 
 def _check_half(volume: NarrowBand | Grid, where: str) -> None:

@@ -6,6 +6,9 @@ from numba import njit
 from .brick_lookup import INSIDE, OUTSIDE
 from .point_triangle import closest_on_triangle
 
+NEGATIVE_ZERO = np.float32(-(2.0**-126))
+"""Stored for inner nodes at distance 0: the least number whose sign every reader keeps."""
+
 
 @njit(cache=True, nogil=True)
 def keep_active(
@@ -34,7 +37,9 @@ def keep_active(
                         mask |= one << np.uint64(jk)
                     else:
                         value = background
-                values[n, node] = -value if negative else value
+                if negative:
+                    value = -value if value > 0.0 else NEGATIVE_ZERO
+                values[n, node] = value
             active[n, i] = mask
             any_active |= mask != 0
         if any_active:

@@ -8,13 +8,12 @@ from ..mesh import Mesh
 from ..mesh.two_set import TwoSetReport, check
 from ..progress import Progress, silent
 from ..spatial.closest_point import ClosestPoint
+from .far_field import BYTES_PER_FACE, fill_grid
 from .lattice import resolve_voxel_size
 from .memory import require_memory
 from .narrow_band import check_half_width, mesh_to_band
 from .placed_mesh import bounding_faces
 from .sign import SignMethod, choose_sign
-
-NODES_AT_ONCE = 1 << 20
 
 
 def mesh_to_grid(
@@ -36,13 +35,16 @@ def mesh_to_grid(
     Notes
     -----
     Accuracy: every value is the Euclidean distance rounded to float32, near and far.
-    Cost: one closest-point query per node outside the band.
+    Cost: about a tenth of a closest-point query per node outside the band, for triangles of a
+    voxel's size; in proportion to their number where they are smaller.
+    Method: see `kernels.far_lists`; nothing is propagated from node to node.
     """
     size = resolve_voxel_size(mesh, resolution, voxel_size)
     check_half_width(half_width)
     first, shape = _node_box(mesh, size, half_width, translation)
     where = f"mesh_to_grid(...): {shape[0]:.4g} x {shape[1]:.4g} x {shape[2]:.4g} nodes"
-    require_memory(4 * float(np.prod(shape)) + 150 * NODES_AT_ONCE, max_memory, where=where)
+    needed = 4 * float(np.prod(shape)) + BYTES_PER_FACE * mesh.n_faces
+    require_memory(needed, max_memory, where=where)
     first, shape = first.astype(np.int64), shape.astype(np.int64)
     if report is None:
         report = check(mesh, self_intersections=False)
@@ -57,14 +59,8 @@ def mesh_to_grid(
         max_memory=max_memory,
         progress=progress,
     )
-    values = np.empty(shape, np.float32)
     query = ClosestPoint(_bounding_mesh(mesh, band, report))
-    planes = max(1, int(NODES_AT_ONCE // np.prod(shape[1:])))
-    for i in range(0, shape[0], planes):
-        last = min(i + planes, shape[0])
-        ijk = np.indices((last - i, *shape[1:])).reshape(3, -1).T + first + np.array([i, 0, 0])
-        values[i:last] = _distances(band, query, ijk).reshape(last - i, *shape[1:])
-        progress("far field", last / shape[0])
+    values = fill_grid(band, query, first, shape, progress)
     return Grid(values, band.voxel_size, band.to_world(first[None])[0], band.sign)
 
 
@@ -86,12 +82,3 @@ def _node_box(
     first = np.floor((mesh.box.lower - origin) / voxel_size - half_width)
     last = np.ceil((mesh.box.upper - origin) / voxel_size + half_width)
     return first, last - first + 1
-
-
-def _distances(band: NarrowBand, query: ClosestPoint, ijk: np.ndarray) -> np.ndarray:
-    """Signed distances of nodes: the band's where it has them, else by closest point."""
-    values = band.value_at(ijk)
-    far = np.abs(values) >= band.background
-    distance = query(band.to_world(ijk[far])).distance
-    values[far] = np.copysign(distance, values[far])
-    return values

@@ -30,6 +30,7 @@ Seeds = Int32[np.ndarray, " seeds"]  # one per point, or none at all
 UNIT_ROUNDOFF = 2.0**-53
 ROUNDING = 64 * UNIT_ROUNDOFF  # times (|p - center| + radius of the mesh); see ClosestPoint
 POINTS_PER_PIECE = 16384  # about 10 ms: often enough for progress and Ctrl-C
+LARGEST = 1e30  # of a coordinate, world units
 MORTON_FROM = 256  # fewer points are asked in the order they come
 
 
@@ -107,6 +108,7 @@ class ClosestPoint:
         m = mesh.n_faces
         self.corners = mesh.triangles
         box = Box.around(self.corners.reshape(-1, 3))
+        _check_size(box)
         self.center, self.radius = box.center, 0.5 * box.diagonal
         self.corners -= self.center
         boxes = np.empty((m, 6), np.float32)
@@ -114,7 +116,7 @@ class ClosestPoint:
         self.face_of_slot = np.empty(m, np.int32)
         children, child_boxes = np.empty((m + 1, 2), np.int32), np.empty((m + 1, 12), np.float32)
         n_nodes = build_tree(boxes, self.face_of_slot, children, child_boxes)
-        self._tree = (children[:n_nodes].copy(), child_boxes[:n_nodes].copy())
+        self.tree = (children[:n_nodes].copy(), child_boxes[:n_nodes].copy())
         self.slot_of_face = np.empty(m, np.int32)
         self.slot_of_face[self.face_of_slot] = np.arange(m, dtype=np.int32)
         self.frames = np.empty((m, FRAME_SIZE))
@@ -199,7 +201,7 @@ class ClosestPoint:
             begin, end = pieces[piece]
             closest_slots(
                 *(centered, sequence, begin, end, seeds),
-                *(self.frames, self.face_of_slot, *self._tree, squares, slots),
+                *(self.frames, self.face_of_slot, *self.tree, squares, slots),
             )
 
         run_pieces(work, len(pieces), stage="closest points", progress=progress)
@@ -217,6 +219,17 @@ class ClosestPoint:
             return self.slot_of_face[seed_faces]
         fix = "pass one face index per point, from 0 to n_faces - 1"
         raise SpatialError(what, "ClosestPoint(...)(seed_faces=...)", fix)
+
+
+def _check_size(box: Box) -> None:
+    """The search squares lengths and keeps boxes in float32."""
+    farthest = float(np.abs([box.lower, box.upper]).max())
+    if farthest > LARGEST:
+        raise SpatialError(
+            f"coordinates reach {farthest:g}",
+            "ClosestPoint(mesh)",
+            f"scale the mesh so that they stay below {LARGEST:g}",
+        )
 
 
 def _check_points(points: Points) -> None:

@@ -72,7 +72,7 @@ def test_convert_writes_a_full_grid_halves_and_closest_faces(cli, tmp_path):
     cli("convert", mesh, tmp_path / "h.npz", "--half", *options)
     assert cli("info", tmp_path / "h.npz", "--json").json["dtype"] == "float16"
     closest = cli("convert", mesh, tmp_path / "c.npz", "--closest", *options).json
-    assert closest["has_closest_faces"] is True
+    assert closest["has_closest_face"] is True
     assert read_volume(tmp_path / "c.npz").closest_face.max() < 320
 
 

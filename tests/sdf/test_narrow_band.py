@@ -12,10 +12,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from meshsdf.errors import MemoryLimitError, SdfError
 from meshsdf.grid import NarrowBand
 from meshsdf.mesh import Mesh
+from meshsdf.mesh.measures import euler_number, n_components
 from meshsdf.mesh.primitives import box_mesh, icosphere
 from meshsdf.mesh.tubes import torus
 from meshsdf.mesh.two_set import check
 from meshsdf.sdf import choose_sign, mesh_to_band
+from meshsdf.surface import marching_cubes
 
 # Values are float32 of a float64 distance: half an ulp of 3 voxels, plus 1e-7 voxel of slack
 ROUNDING = 3 * 2.0**-24 + 1e-7
@@ -137,6 +139,20 @@ def test_overlapping_shells_are_a_union_for_winding_and_have_a_hole_for_parity()
     middle = np.array([[4, 0, 0]])  # (0.25, 0, 0) lies in both
     assert mesh_to_band(both, voxel_size=1 / 16, sign="winding").value_at(middle) < 0
     assert mesh_to_band(both, voxel_size=1 / 16, sign="parity").value_at(middle) > 0
+
+
+def test_an_inner_sheet_on_the_nodes_leaves_no_surface_inside_the_union():
+    # Walls exactly on lattice planes: inner nodes at distance 0 must not count as outside
+    one, two = box_mesh(), box_mesh(center=(0.5, 0.0, 0.0))
+    both = Mesh(
+        np.concatenate([one.vertices, two.vertices]), np.concatenate([one.faces, two.faces + 8])
+    )
+    band = mesh_to_band(both, voxel_size=1 / 16, sign="winding")
+    on_sheet = np.array([[8, 0, 0], [0, 0, 0]])  # x = 0.5 and x = 0, walls inside the union
+    assert (band.value_at(on_sheet) < 0).all()
+    surface = marching_cubes(band)
+    assert n_components(surface) == 1
+    assert euler_number(surface) == 2
 
 
 def test_inside_out_is_still_inside():
