@@ -5,11 +5,10 @@ such a mesh is open: the crack is real, only its width is not worth a sign. Here
 open edges are welded within a distance that gives each of them a partner, as long as that is less
 than half of every open edge, or within rounding: cracks are zipped, but no hole is collapsed.
 
-If two repairs that move no vertex by more than w both close a mesh, they agree on inside and
-outside at every point further than w from it, given that the w-neighbourhood of its open edges
-does not cut space apart: the prism between the two repairs stays within w of the mesh, and what
-the open edges sweep stays within w of them. So the width is also the distance beyond which the
-sign is certain.
+Certificate. Let two repairs each move no vertex by more than w and close the mesh. The prism
+between them stays within w of the mesh, and what the open edges sweep stays within w of the open
+edges. If space without the 2 w-neighbourhood of the welded rims is connected (`rim_graph`), the
+two repairs therefore agree on inside and outside at every point further than 3 w from the mesh.
 """
 
 from dataclasses import dataclass
@@ -20,8 +19,10 @@ from ..arrays import Faces, Indices, Points
 from .edge_chain import residual_lines
 from .edge_table import edge_table
 from .pieces import connected_labels
+from .rim_graph import complement_is_connected
 
 HALF = 0.49  # of the shortest open edge: below one half, so that no edge collapses
+MORE = 1 + 1e-9  # so that pairs at the very distance are found
 ROUNDING = 10.0 ** np.arange(-15, -6)  # of the mesh's size: edges this short may collapse
 
 
@@ -34,13 +35,17 @@ class CrackRepair:
     labels : (u,) int32
         For each welded vertex, the one that stands for it.
     width : float
-        World units; no vertex moves further.
+        World units; no vertex moves further, and no smaller weld of this kind closes the mesh.
+    certain_beyond : float or None
+        World units; further than this from the mesh every sign is proved: it is the same for all
+        repairs that move no vertex by more than the width. None if the proof fails.
     oriented : bool
         The closed mesh is oriented.
     """
 
     labels: Indices
     width: float
+    certain_beyond: float | None
     oriented: bool
 
 
@@ -63,17 +68,33 @@ def close_cracks(points: Points, faces: Faces, segments: np.ndarray) -> CrackRep
     size = np.ptp(points[rim], axis=0).max()
     widths = [width for width in (partner,) if width < HALF * shortest]
     for width in sorted([*widths, *(ROUNDING * size)]):
-        repair = _weld_within(width * (1 + 1e-9), tree, rim, points, faces)
-        if repair is not None:
-            return repair
+        if _weld_within(width, tree, rim, points, faces, segments) is not None:
+            return _smallest_weld(width, tree, rim, points, faces, segments)
     return None
 
 
+def _smallest_weld(
+    width: float, tree, rim: np.ndarray, points: Points, faces: Faces, segments: np.ndarray
+) -> CrackRepair:
+    """Bisect the distances between rim vertices up to ``width``, which closes the mesh."""
+    pairs = tree.query_pairs(width * MORE, output_type="ndarray")
+    apart = np.linalg.norm(points[rim[pairs[:, 0]]] - points[rim[pairs[:, 1]]], axis=1)
+    lengths = np.unique(apart)
+    low, high = 0, len(lengths) - 1
+    while low < high:
+        middle = (low + high) // 2
+        if _weld_within(lengths[middle], tree, rim, points, faces, segments) is None:
+            low = middle + 1
+        else:
+            high = middle
+    return _weld_within(lengths[high], tree, rim, points, faces, segments)
+
+
 def _weld_within(
-    width: float, tree, rim: np.ndarray, points: np.ndarray, faces: np.ndarray
+    width: float, tree, rim: np.ndarray, points: Points, faces: Faces, segments: np.ndarray
 ) -> CrackRepair | None:
     """Weld rim vertices up to ``width`` apart, found by the k-d tree; None if still open."""
-    pairs = tree.query_pairs(width, output_type="ndarray")
+    pairs = tree.query_pairs(width * MORE, output_type="ndarray")
     if len(pairs) == 0:
         return None
     labels = _weld_pairs(pairs, rim, len(points))
@@ -81,8 +102,10 @@ def _weld_within(
     lines = None if table.is_balanced else residual_lines(table, points)
     if lines is not None and len(lines.survivors(points)):
         return None
-    moved = np.linalg.norm(points - points[labels], axis=1).max()
-    return CrackRepair(labels, float(moved), lines is None or lines.is_balanced())
+    moved = float(np.linalg.norm(points - points[labels], axis=1).max())
+    proved = complement_is_connected(points, labels[segments], 2 * moved)
+    oriented = lines is None or lines.is_balanced()
+    return CrackRepair(labels, moved, 3 * moved if proved else None, oriented)
 
 
 def _weld_pairs(pairs: np.ndarray, rim: np.ndarray, n_points: int) -> np.ndarray:

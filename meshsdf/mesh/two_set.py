@@ -143,10 +143,7 @@ def _recommend(
             "counting crossings does not ask for it"
         )
     if repair is not None:
-        return "winding" if repair.oriented else "parity", (
-            f"closed but for cracks: with those zipped, the sign is certain further than "
-            f"{repair.width:.2g} units from the surface"
-        )
+        return "winding" if repair.oriented else "parity", "closed once its cracks are zipped"
     if open_edge_share > SOUP:
         return "unsigned", (
             f"{open_edge_share:.0%} of the edges are open: the faces enclose nothing that a sign "

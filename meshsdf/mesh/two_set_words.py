@@ -21,6 +21,7 @@ def report_to_json(report: TwoSetReport) -> dict:
     return plain | {
         "n_components": report.n_components,
         "crack_width": report.crack_width,
+        "crack_certain_beyond": None if report.repair is None else report.repair.certain_beyond,
         "holes": [
             {
                 "length": _finite(hole.length),
@@ -107,7 +108,8 @@ def _open_words(report: TwoSetReport) -> list[str]:
     if report.crack_width is not None:
         words.append(
             f"{'It is only a crack' if n == 1 else 'They are only cracks'}: moving vertices by "
-            f"{report.crack_width:.2g} units closes the mesh."
+            f"{report.crack_width:.2g} units closes the mesh"
+            + _certificate_words(report.repair.certain_beyond)
         )
     else:
         words.append(
@@ -127,6 +129,12 @@ def _open_words(report: TwoSetReport) -> list[str]:
             f"{_count(report.n_orientation_conflicts, 'closed edge')}."
         )
     return words
+
+
+def _certificate_words(certain_beyond: float | None) -> str:
+    if certain_beyond is None:
+        return "."
+    return f", and every sign further than {certain_beyond:.2g} units from the surface is proved."
 
 
 def _part_words(report: TwoSetReport) -> list[str]:

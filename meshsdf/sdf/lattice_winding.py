@@ -48,14 +48,14 @@ class LatticeWinding:
         """Return `sides` of the index's own bricks; to be called before any other."""
         x = self.local[:, 0]
         ranges = even_ranges(int(x[-1] - x[0]) + 1, SLABS_PER_THREAD * n_threads())
-        slabs = [(x[0] + first, x[0] + last) for first, last in ranges]
+        slabs = [(int(x[0]) + first, int(x[0]) + last) for first, last in ranges]
         edges = BRICK * np.array([slabs[0][0], *(last for _, last in slabs)], np.float64)
         lists = bin_features(self.placed.points, self.placed.faces, edges, 1.0)
         inside = np.empty((len(x), BRICK**3), np.bool_)
         uncertain = np.empty(len(x), np.int64)
 
         def wind_slab(s: int) -> None:
-            a, b = np.searchsorted(x, slabs[s])
+            a, b = (int(place) for place in np.searchsorted(x, slabs[s]))
             counts = self._crossings(items_of(lists, s), slabs[s], a, b)
             sum_upwards(self.local[a:b], counts, self.top[a:b])
             self._wind(self.local[a:b], counts, inside[a:b], uncertain[a:b])

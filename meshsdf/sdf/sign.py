@@ -86,9 +86,14 @@ def choose_sign(
 
 
 def _crack_warnings(report: TwoSetReport) -> tuple[str, ...]:
-    n, width = len(report.holes), report.repair.width
+    n, repair = len(report.holes), report.repair
     cracks = "1 crack" if n == 1 else f"{n} cracks"
-    return (f"{cracks} zipped for the sign, which is certain beyond {width:.2g} units",)
+    if repair.certain_beyond is None:
+        return (f"{cracks} up to {repair.width:.2g} units wide zipped for the sign",)
+    return (
+        f"{cracks} zipped for the sign, which is proved further than "
+        f"{repair.certain_beyond:.2g} units from the surface",
+    )
 
 
 def _opening_warnings(report: TwoSetReport) -> tuple[str, ...]:
