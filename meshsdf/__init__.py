@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from .io import read_mesh, read_volume, write_mesh, write_volume
     from .mesh import Mesh, TwoSetReport, check
     from .report import Comparison, Enclosure, RoundTrip, compare, roundtrip
-    from .sdf import mesh_to_band, mesh_to_grid
+    from .sdf import MeshDistance, mesh_to_band, mesh_to_grid
     from .surface import marching_cubes
 
 _HOME = {
@@ -40,6 +40,7 @@ _HOME = {
     "Enclosure": "report",
     "Grid": "grid",
     "Mesh": "mesh",
+    "MeshDistance": "sdf",
     "MeshsdfError": "errors",
     "NarrowBand": "grid",
     "RoundTrip": "report",
@@ -61,6 +62,7 @@ __all__ = [
     "Enclosure",
     "Grid",
     "Mesh",
+    "MeshDistance",
     "MeshsdfError",
     "NarrowBand",
     "RoundTrip",

@@ -88,6 +88,11 @@ def command(
     if volume.sign != choice.method:
         console.warn("no node is inside, so distances are unsigned")
     facts = volume.facts()
+    if facts.get("uncertain_voxels"):
+        n = plural(facts["uncertain_voxels"], "voxel")
+        console.warn(
+            f"{n} near the membranes of openings: the winding number is within 0.05 of 1/2"
+        )
     seconds = console.timings("load", "check", "bricks", "distance", "far field", "sign", "write")
     seconds["distance"] += seconds.pop("bricks") + seconds.pop("far field")
     console.result(_words(mesh, out, facts, choice, loaded, seconds["total"]))

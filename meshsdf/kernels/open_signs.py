@@ -13,8 +13,10 @@ from numba import njit
 from .boundary_change import change
 from .boundary_winding import boundary_term
 
-COARSE = 2e-4  # error allowed per expansion, in units of W
-FINE = 1e-8
+COARSE = 1e-3  # error allowed per expansion, in units of W
+FINE = 1e-5
+# A hole's membrane may lie in a plane of nodes; all of them are then outside, rounding or not
+HALF = 0.5 + 1e-9
 # Along a line through the cube the slope at the centre is off by the derivative's bound times the
 # half diagonal; over half a side that is 2 / sqrt(3) of the bound for points and centre
 ALONG_LINE = 1.16
@@ -48,7 +50,7 @@ def sum_upwards(coordinates, crossings, top):
 @njit(cache=True, nogil=True)
 def _is_clear(wound, error, membrane):
     """An error of W does not change on which side of 1/2 and of 1/2 +- membrane |W| lies."""
-    off = abs(abs(wound) - 0.5)
+    off = abs(abs(wound) - HALF)
     return off > error and abs(off - membrane) > error
 
 
@@ -73,13 +75,13 @@ def _settle_evenly(counts, first, side, value, error, membrane, inside):
                 count = counts[64 * i + 8 * j + k]
                 low, high = min(low, count), max(high, count)
     for count in range(low, high + 1):
-        if abs(abs(count + value) - 0.5) <= error + membrane:
+        if abs(abs(count + value) - HALF) <= error + membrane:
             return False
     for i in range(first[0], first[0] + side):
         for j in range(first[1], first[1] + side):
             for k in range(first[2], first[2] + side):
                 node = 64 * i + 8 * j + k
-                inside[node] = abs(counts[node] + value) > 0.5
+                inside[node] = abs(counts[node] + value) > HALF
     return True
 
 
@@ -121,8 +123,8 @@ def _settle_block(boundary, corner, first, side, counts, membrane, inside):
                 if not _is_clear(wound, bent + error, membrane):
                     p = (x + i, y + j, z + (k - half))
                     wound = _winding(boundary, p, counts[node], membrane)
-                inside[node] = abs(wound) > 0.5
-                uncertain += abs(abs(wound) - 0.5) < membrane
+                inside[node] = abs(wound) > HALF
+                uncertain += abs(abs(wound) - HALF) < membrane
     return uncertain
 
 
@@ -146,8 +148,8 @@ def _wind_eighth(boundary, corner, start, counts, membrane, inside):
             node = 64 * i + 8 * j + k
             p = (float(corner[0] + i), float(corner[1] + j), float(corner[2] + k))
             wound = abs(_winding(boundary, p, counts[node], membrane))
-            inside[node] = wound > 0.5
-            uncertain += abs(wound - 0.5) < membrane
+            inside[node] = wound > HALF
+            uncertain += abs(wound - HALF) < membrane
     return uncertain
 
 
@@ -182,21 +184,3 @@ def wind_points(boundary, points, counts, wound):
         p = (points[n, 0], points[n, 1], points[n, 2])
         value, _ = boundary_term(boundary, p, 0.0)
         wound[n] = counts[n] + value
-
-
-@njit(cache=True, nogil=True)
-def mark_mixed_faces(inside, mixed):
-    """``mixed[b, f]``: nodes on face f (-x, +x, -y, +y, -z, +z) of brick b lie on both sides."""
-    for b in range(len(inside)):
-        for face in range(6):
-            axis, layer = face >> 1, 7 * (face & 1)
-            n = 0
-            for u in range(8):
-                for v in range(8):
-                    if axis == 0:
-                        n += inside[b, layer, u, v]
-                    elif axis == 1:
-                        n += inside[b, u, layer, v]
-                    else:
-                        n += inside[b, u, v, layer]
-            mixed[b, face] = 0 < n < 64

@@ -2,7 +2,16 @@
 
 from .dense import mesh_to_grid
 from .lattice import resolve_voxel_size
+from .mesh_distance import MeshDistance, PointDistances
 from .narrow_band import mesh_to_band
 from .sign import SignChoice, choose_sign
 
-__all__ = ["SignChoice", "choose_sign", "mesh_to_band", "mesh_to_grid", "resolve_voxel_size"]
+__all__ = [
+    "MeshDistance",
+    "PointDistances",
+    "SignChoice",
+    "choose_sign",
+    "mesh_to_band",
+    "mesh_to_grid",
+    "resolve_voxel_size",
+]

@@ -44,7 +44,7 @@ class LatticeWinding:
         self.local = index.coordinates - index.origin
         self.top = np.zeros((index.n_bricks, BRICK * BRICK), np.int32)
 
-    def first_sides(self, progress: Progress = silent) -> tuple[np.ndarray, np.ndarray]:
+    def first_sides(self, progress: Progress = silent) -> tuple[np.ndarray, int]:
         """Return `sides` of the index's own bricks; to be called before any other."""
         x = self.local[:, 0]
         ranges = even_ranges(int(x[-1] - x[0]) + 1, SLABS_PER_THREAD * n_threads())
@@ -61,19 +61,17 @@ class LatticeWinding:
             self._wind(self.local[a:b], counts, inside[a:b], uncertain[a:b])
 
         run_pieces(wind_slab, len(slabs), stage="sign", progress=progress)
-        return inside.reshape(-1, BRICK, BRICK, BRICK), uncertain
+        return inside.reshape(-1, BRICK, BRICK, BRICK), int(uncertain.sum())
 
-    def sides(
-        self, bricks: np.ndarray, progress: Progress = silent
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def sides(self, bricks: np.ndarray, progress: Progress = silent) -> tuple[np.ndarray, int]:
         """Tell which nodes of bricks missing in the index lie inside.
 
         Returns
         -------
         inside : (b, 8, 8, 8) bool
             The winding number exceeds 1/2 in magnitude.
-        uncertain : (b,) int64
-            In how many nodes it does so, or does not, by less than `MEMBRANE`.
+        n_uncertain : int
+            At how many nodes it does so, or does not, by less than `MEMBRANE`.
         """
         local = np.ascontiguousarray(bricks - self.index.origin)
         inside = np.empty((len(local), BRICK**3), np.bool_)
@@ -86,7 +84,7 @@ class LatticeWinding:
             self._wind(local[some], counts, inside[some], uncertain[some])
 
         run_pieces(wind_piece, len(pieces), stage="sign", progress=progress)
-        return inside.reshape(-1, BRICK, BRICK, BRICK), uncertain
+        return inside.reshape(-1, BRICK, BRICK, BRICK), int(uncertain.sum())
 
     def at_centers(self, bricks: np.ndarray) -> Values:
         """Return the winding number of node (4, 4, 4) of bricks missing in the index."""

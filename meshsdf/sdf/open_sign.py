@@ -4,7 +4,7 @@ A node is inside where the magnitude of the winding number exceeds 1/2 (Jacobson
 2013, doi:10.1145/2461912.2461916). Across an opening the sign changes far from any face: bricks
 are added where it does, with no active nodes and +-background, so that the surface extracted from
 the band is closed. The opening's membrane starts at the rim, inside the band, and is followed
-from brick to brick through the faces on which the sign changes.
+from brick to brick through the faces on which, or between which, the sign changes.
 """
 
 from dataclasses import replace
@@ -13,11 +13,15 @@ import numpy as np
 
 from ..arrays import Number
 from ..grid import BrickIndex, NarrowBand
-from ..kernels.open_signs import mark_mixed_faces
+from ..kernels.open_signs import HALF
+from ..kernels.sign_changes import mark_mixed_faces
 from ..progress import Progress
 from .lattice_winding import LatticeWinding
 from .memory import BYTES_PER_BRICK, require_memory
 from .placed_mesh import PlacedMesh
+
+# To the neighbours through the faces -x, +x, -y, +y, -z, +z
+STEPS = np.repeat(np.eye(3, dtype=np.int64), 2, axis=0) * np.tile([[-1], [1]], (3, 1))
 
 
 def sign_by_winding_number(
@@ -32,49 +36,58 @@ def sign_by_winding_number(
     Accuracy: distances are untouched. The sign is that of the exact generalised winding number,
     up to rounding (1e-12, or more within 1e-6 voxels of a boundary edge); nodes of one missing
     region get one sign, that of its first brick. ``uncertain_voxels`` counts the nodes of bricks
-    at which it is nearer to 1/2 than 0.05.
+    at which it is nearer to 1/2 than 0.05. Nodes within 1e-9 of 1/2 are outside.
     """
     winding = LatticeWinding(placed, band.index)
-    inside, uncertain = winding.first_sides(progress)
-    bricks, sides = [band.index.coordinates], [inside]
-    n_uncertain, n = int(uncertain.sum()), band.index.n_bricks
-    grown = _across_mixed_faces(bricks, inside, band.index)
-    while len(grown):
-        n += len(grown)
+    own, n_uncertain = winding.first_sides(progress)
+    bricks, inside = np.empty((0, 3), np.int64), np.empty((0, *own.shape[1:]), np.bool_)
+    last = band.index.coordinates
+    while True:
+        grown = BrickIndex.from_coordinates(bricks)
+        fresh = _beyond_changes(last, own, inside, (band.index, grown))
+        if len(fresh) == 0:
+            break
+        n = band.index.n_bricks + len(bricks) + len(fresh)
         require_memory(2 * n * BYTES_PER_BRICK, max_memory, where="mesh_to_band(...): openings")
-        inside, uncertain = winding.sides(grown, progress)
-        n_uncertain += int(uncertain.sum())
-        bricks.append(grown)
-        sides.append(inside)
-        grown = _across_mixed_faces(bricks, inside, band.index)
-    coordinates, inside = bricks[0], sides[0]
-    if len(bricks) > 1:
-        coordinates, inside = np.concatenate(bricks), np.concatenate(sides)
-        order = np.lexsort(coordinates.T[::-1])
-        coordinates, inside = coordinates[order], inside[order]
-    inner = _inner_bricks(winding, coordinates)
-    return _signed(band, coordinates, inner, inside, n_uncertain)
+        more, n_more = winding.sides(fresh, progress)
+        n_uncertain += n_more
+        last = fresh
+        bricks, inside = _merge(bricks, inside, fresh, more)
+    bricks, inside = _merge(band.index.coordinates, own, bricks, inside)
+    return _signed(band, bricks, _inner_bricks(winding, bricks), inside, n_uncertain)
 
 
-def _across_mixed_faces(
-    bricks: list[np.ndarray], inside: np.ndarray, index: BrickIndex
+def _merge(
+    bricks: np.ndarray, inside: np.ndarray, more: np.ndarray, more_inside: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Both sets of bricks, in lexicographic order."""
+    if len(more) == 0:
+        return bricks, inside
+    bricks, inside = np.concatenate([bricks, more]), np.concatenate([inside, more_inside])
+    order = np.lexsort(bricks.T[::-1])
+    return bricks[order], inside[order]
+
+
+def _slots(bricks: np.ndarray, indices: tuple[BrickIndex, BrickIndex]) -> np.ndarray:
+    """Slots of bricks in the band's index, or behind those in that of the grown; else negative."""
+    found, grown = (index.lookup(bricks) for index in indices)
+    return np.where(grown >= 0, grown + indices[0].n_bricks, found).astype(np.int32)
+
+
+def _beyond_changes(
+    bricks: np.ndarray, own: np.ndarray, inside: np.ndarray, indices: tuple[BrickIndex, BrickIndex]
 ) -> np.ndarray:
-    """Bricks not yet known next to faces of the last of ``bricks`` on which the sign changes.
-
-    Known are those of the index and those that were grown: all of ``bricks``.
-    """
-    mixed = np.empty((len(inside), 6), np.bool_)
-    mark_mixed_faces(inside, mixed)
-    found = []
-    for face in range(6):
-        step = (2 * (face & 1) - 1) * np.eye(3, dtype=np.int64)[face >> 1]
-        beyond = bricks[-1][mixed[:, face]] + step
-        found.append(beyond[index.lookup(beyond) < 0])
-    candidates = np.unique(np.concatenate(found), axis=0)
-    if len(bricks) == 1 or len(candidates) == 0:
-        return candidates
-    grown = BrickIndex.from_coordinates(np.unique(np.concatenate(bricks[1:]), axis=0))
-    return candidates[grown.lookup(candidates) < 0]
+    """Missing bricks into which a change of sign in or next to one of ``bricks`` goes on."""
+    beside = np.stack([_slots(bricks + step, indices) for step in STEPS], axis=1)
+    mixed = np.empty((len(bricks), 6), np.bool_)
+    mixed_beside = np.empty((len(bricks), 6, 6), np.bool_)
+    mark_mixed_faces(own, inside, _slots(bricks, indices), beside, mixed, mixed_beside)
+    brick, face = np.nonzero(mixed & (beside < 0))
+    candidates = bricks[brick] + STEPS[face]
+    brick, way, face = np.nonzero(mixed_beside)
+    candidates = np.concatenate([candidates, bricks[brick] + STEPS[way] + STEPS[face]])
+    candidates = candidates[_slots(candidates, indices) < 0]
+    return np.unique(candidates, axis=0)
 
 
 def _inner_bricks(winding: LatticeWinding, coordinates: np.ndarray) -> np.ndarray:
@@ -92,7 +105,7 @@ def _inner_bricks(winding: LatticeWinding, coordinates: np.ndarray) -> np.ndarra
     if len(first) == 0:
         return np.empty((0, 3), np.int64)
     bricks = np.stack(np.unravel_index(first, regions.shape), axis=1) + low
-    inner = flat[first][np.abs(winding.at_centers(bricks)) > 0.5]
+    inner = flat[first][np.abs(winding.at_centers(bricks)) > HALF]
     return np.argwhere(np.isin(regions, inner)) + low
 
 

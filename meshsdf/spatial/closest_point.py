@@ -192,7 +192,7 @@ class ClosestPoint:
         ``seeds`` is empty or holds a slot per point. A slot is a place in ``frames``, and
         ``face_of_slot[slot]`` is its face.
         """
-        sequence = _morton_order(centered)
+        sequence = morton_order(centered)
         n = len(centered)
         squares, slots = np.empty(n), np.empty(n, np.int32)
         pieces = even_ranges(n, n // POINTS_PER_PIECE + 1)
@@ -243,7 +243,7 @@ def _check_points(points: Points) -> None:
     )
 
 
-def _morton_order(points: Points) -> Indices:
+def morton_order(points: Points) -> Indices:
     """Order of the points along a Z-curve through the cube around them."""
     if len(points) < MORTON_FROM:
         return np.arange(len(points), dtype=np.int32)

@@ -3,6 +3,8 @@
 import igl
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from meshsdf.errors import MemoryLimitError
@@ -10,6 +12,7 @@ from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere
 from meshsdf.mesh.tubes import torus, trefoil_tube
 from meshsdf.sdf import mesh_to_band, mesh_to_grid
+from tests.oracles import closest_by_brute_force
 
 
 def nodes(grid) -> np.ndarray:
@@ -77,3 +80,103 @@ def test_an_open_mesh_gets_unsigned_or_wound_signs_everywhere():
 def test_a_grid_that_would_not_fit_is_refused_with_its_size():
     with pytest.raises(MemoryLimitError, match=r"4\.\d+ GB would be needed"):
         mesh_to_grid(icosphere(1.0), resolution=1000, max_memory=1e9)
+
+
+def soup_of(corners: np.ndarray) -> Mesh:
+    """Unconnected triangles (m, 3, 3)."""
+    faces = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
+    return Mesh(corners.reshape(-1, 3), faces)
+
+
+def assert_exact_everywhere(mesh: Mesh, **options) -> np.ndarray:
+    """Every node, near or far, has libigl's distance; return the grid's values."""
+    grid = mesh_to_grid(mesh, **options)
+    center = mesh.box.center
+    faces = mesh.faces.astype(np.int64)
+    points, vertices = nodes(grid) - center, mesh.vertices - center
+    squared, _, _ = igl.point_mesh_squared_distance(points, vertices, faces)
+    # float32 of the value, 1e-7 voxel of slack in the band, and the spacing of far coordinates
+    atol = 2e-7 * grid.voxel_size + 4 * np.spacing(np.abs(mesh.vertices).max())
+    assert_allclose(np.abs(grid.values.ravel()), np.sqrt(squared), rtol=2.0**-23, atol=atol)
+    return grid.values
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    st.integers(0, 10**6),
+    st.sampled_from([1, 3, 20, 200]),
+    st.sampled_from([0.01, 0.1, 1.0]),
+    st.sampled_from([1e-12, 1e-9, 1.0, 1e9, 1e15]),
+    st.sampled_from([0.0, 1e6]),
+)
+def test_every_node_of_any_soup_has_its_exact_distance(seed, n, size, scale, offset):
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-1, 1, (n, 1, 3)) + size * rng.normal(size=(n, 3, 3))
+    soup = soup_of(scale * (corners + offset))
+    # A translation puts the first node anywhere in its brick
+    translation = scale * rng.uniform(0, 1, 3)
+    assert_exact_everywhere(
+        soup, resolution=25 + seed % 9, half_width=1.5, sign="unsigned", translation=translation
+    )
+
+
+def test_the_inside_of_a_fine_sphere_is_exact_where_all_faces_are_equally_near():
+    mesh = icosphere(1.0, subdivisions=4)
+    values = assert_exact_everywhere(mesh, resolution=40, half_width=1.0)
+    assert values.min() < -0.99
+
+
+def test_a_fan_of_needles_is_exact():
+    n = 500
+    angle = 2 * np.pi * np.arange(n) / n
+    rim = np.stack([np.cos(angle), np.sin(angle), 0.3 * np.cos(7 * angle)], axis=1)
+    apex = np.broadcast_to([0.1, 0.0, 0.9], rim.shape)
+    fan = soup_of(np.stack([apex, rim, np.roll(rim, -1, axis=0)], axis=1))
+    assert_exact_everywhere(fan, resolution=36, sign="unsigned")
+
+
+def test_slivers_flatter_than_rounding_are_exact():
+    rng = np.random.default_rng(1)
+    a, b = rng.uniform(-1, 1, (2, 30, 3))
+    c = a + rng.uniform(0, 1, (30, 1)) * (b - a) + rng.normal(size=(30, 3)) * 1e-16
+    along = np.stack([a, b, c], axis=1)
+    along[::2, :, 1] = 0.25  # with nodes in their very plane
+    grid = mesh_to_grid(soup_of(along), voxel_size=1 / 8, sign="unsigned")
+    # The oracle is extended precision: libigl answers too much for such slivers
+    expected = closest_by_brute_force(nodes(grid), along)
+    atol = 2e-7 * grid.voxel_size
+    assert_allclose(grid.values.ravel(), expected, rtol=2.0**-23, atol=atol)
+
+
+def test_one_large_triangle_is_exact():
+    corners = np.array([[[0.0, 0, 0], [3, 1, 0.5], [0.5, 2, 2]]])
+    assert_exact_everywhere(soup_of(corners), resolution=50, half_width=1.0, sign="unsigned")
+
+
+def test_large_and_small_faces_side_by_side_are_exact():
+    room = box_mesh(size=(6.0, 6.0, 6.0))
+    crumb = icosphere(0.05, subdivisions=3)
+    faces = np.concatenate([room.faces, crumb.faces + len(room.vertices)])
+    mesh = Mesh(np.concatenate([room.vertices, crumb.vertices]), faces.astype(np.int32))
+    assert_exact_everywhere(mesh, resolution=48, half_width=2.0, sign="parity")
+
+
+def test_the_number_of_threads_changes_no_byte(monkeypatch):
+    mesh = trefoil_tube()
+    here = mesh_to_grid(mesh, resolution=50)
+    for threads in (1, 5):
+        monkeypatch.setattr("meshsdf.kernels.parallel.n_threads", lambda n=threads: n)
+        assert_array_equal(mesh_to_grid(mesh, resolution=50).values, here.values)
+
+
+def test_progress_reaches_the_far_field_and_an_exception_in_it_stops_the_work():
+    told = []
+
+    def stop(stage: str, share: float) -> None:
+        told.append(stage)
+        if stage == "far field":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        mesh_to_grid(torus(1.0, 0.3), resolution=30, progress=stop)
+    assert told[-1] == "far field"
