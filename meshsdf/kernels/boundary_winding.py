@@ -37,8 +37,6 @@ from .crossings import edge_height
 NEAR_LINE = 1e-6  # voxels; far above the rounding of local coordinates, far below a voxel
 BESIDE = 1e-150  # stands for an infinitely small step; its square is still a float
 TURN = 2.0 * np.pi
-MANY_EDGES = 2000  # beyond, errors of expansions are taken for independent
-SIGMAS = 6.0
 TINY, HUGE = 1e-30, 1e30  # LEAF_EDGES numbers between these have a product that is a float
 
 
@@ -121,17 +119,14 @@ def _sum_edges(points, chain, chain_line, line_ends, first, last, p):
 
 @njit(cache=True, nogil=True)
 def boundary_term(boundary, p, tolerance):
-    """Return sum Omega / (4 pi) at p and a bound on its error; an estimate for many edges.
+    """Return sum Omega / (4 pi) at p and a bound on its error.
 
     ``boundary`` holds points, chain, chain_line, line_ends, nodes, data (`boundary_tree`). A tree
     node is expanded where its error is at most ``tolerance`` and p does not lie above its box, so
-    that the fan is not met by the line down from p. The errors of expansions add up to at most
-    their sum. Of thousands, in a soup, that is far too much: they are then taken for independent,
-    and the sum exceeds 6 times the root of their squares with a probability below 4e-8
-    (Hoeffding 1963, doi:10.1080/01621459.1963.10500830).
+    that the fan is not met by the line down from p.
     """
     points, chain, chain_line, line_ends, nodes, data = boundary
-    total, error, squares = 0.0, 0.0, 0.0
+    total, error = 0.0, 0.0
     n = 0
     while n < len(nodes):
         node = data[n]
@@ -159,7 +154,6 @@ def boundary_term(boundary, p, tolerance):
             bend += 2.0 * node[MOMENT + 5] * y * z
             total += (flux - 3.0 * bend / (cube * squared)) / (2.0 * TURN)
             error += left
-            squares += left * left
             if nodes[n, 4] == 1:
                 # The chord takes the place of the chain
                 a = _seen(points, chain[nodes[n, 0], 0], p)
@@ -174,6 +168,4 @@ def boundary_term(boundary, p, tolerance):
             n = nodes[n, 2]
         else:
             n += 1
-    if len(chain) > MANY_EDGES:
-        error = min(error, SIGMAS * np.sqrt(squares))
     return total, error

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from .brick_lookup import INSIDE, find_brick
-from .far_lists import ETA, N_ROWS, foot, gather, keep, score
+from .far_lists import ETA, N_ROWS, foot, gather, keep, score, select
 from .point_triangle import H, L, M
 
 BLOCK = 16
@@ -109,7 +109,7 @@ def _copy_band(first, root, pages, values, background, brick0, out):
 
 @njit(cache=True, nogil=True)
 def _measure_part(
-    xs, ys, zs, low, high, slots, scores, bound, frames, inverses, nodes, background, out
+    xs, ys, zs, low, high, slots, chosen, n_chosen, frames, inverses, nodes, background, out
 ):
     """Write the distances of the far nodes of a 2^3 part, from the triangles it needs."""
     for n in range(8):
@@ -117,10 +117,9 @@ def _measure_part(
         nodes[8 + n] = ys[min(low[1] + ((n >> 1) & 1), high[1] - 1)]
         nodes[16 + n] = zs[min(low[2] + (n & 1), high[2] - 1)]
         nodes[24 + n] = np.inf
-    for entry in range(len(slots)):
-        if scores[entry] <= bound:
-            s = slots[entry]
-            _measure(frames[s], inverses[s, 0], inverses[s, 1], nodes)
+    for number in range(n_chosen):
+        s = slots[chosen[number]]
+        _measure(frames[s], inverses[s, 0], inverses[s, 1], nodes)
     for n in range(8):
         i, j, k = low[0] + (n >> 2), low[1] + ((n >> 1) & 1), low[2] + (n & 1)
         if i < high[0] and j < high[1] and k < high[2] and abs(out[i, j, k]) >= background:
@@ -149,7 +148,7 @@ def fill_blocks(
     """
     m = len(frames)
     rows, slots = np.empty((N_ROWS, 3 * m), np.float32), np.empty(3 * m, np.int32)
-    scores = np.empty(m, np.float32)
+    scores, chosen = np.empty(m, np.float32), np.empty(m + 1, np.int32)
     c, half, q, origin = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     nodes = np.empty(32)
@@ -178,7 +177,7 @@ def fill_blocks(
                 first8[axis] = first[axis] + 8 * ((eight >> (2 - axis)) & 1)
             _place(xs, ys, zs, low, high, c, half)
             score(rows, slots, 0, n1, frames, origin, scale, eta, c, half, q, scores)
-            n2 = keep(rows, slots, 0, n1, frames, scale, bound, margin, c, half, q, scores)
+            n2 = keep(rows, slots, 0, n1, frames, scale, bound, margin, c, half, q, scores, chosen)
             for four in range(8):
                 if not _part(out, first8, 4, four, background, low, high):
                     continue
@@ -186,13 +185,16 @@ def fill_blocks(
                     first4[axis] = first8[axis] + 4 * ((four >> (2 - axis)) & 1)
                 _place(xs, ys, zs, low, high, c, half)
                 score(rows, slots, n1, n2, frames, origin, scale, eta, c, half, q, scores)
-                n3 = keep(rows, slots, n1, n2, frames, scale, bound, margin, c, half, q, scores)
+                n3 = keep(
+                    rows, slots, n1, n2, frames, scale, bound, margin, c, half, q, scores, chosen
+                )
                 for two in range(8):
                     if not _part(out, first4, 2, two, background, low, high):
                         continue
                     _place(xs, ys, zs, low, high, c, half)
                     score(rows, slots, n2, n3, frames, origin, scale, eta, c, half, q, scores)
+                    n = select(scores, n2, n3, bound, chosen)
                     _measure_part(
-                        *(xs, ys, zs, low, high, slots[n2:n3], scores, bound),
+                        *(xs, ys, zs, low, high, slots, chosen, n),
                         *(frames, inverses, nodes, background, out),
                     )

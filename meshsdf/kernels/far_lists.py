@@ -168,17 +168,27 @@ def score(rows, slots, begin, end, frames, origin, scale, eta, c, half, q, score
 
 
 @njit(cache=True, nogil=True)
-def keep(rows, slots, begin, end, frames, scale, bound, margin, c, half, q, scores):
-    """Append to the lists the entries begin..end that the block needs; return the new end."""
+def select(scores, begin, end, bound, chosen):
+    """List in ``chosen`` the entries begin..end that score no more than the bound; count them."""
+    n = 0
+    for entry in range(begin, end):
+        # No branch: which entries stay cannot be predicted
+        chosen[n] = entry
+        n += scores[entry - begin] <= bound
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _drop_large(rows, slots, frames, scale, margin, c, half, q, chosen, n_chosen):
+    """Apply the foot rule to the chosen triangles larger than the block; count those left."""
     large = 4.0 * (max(half[0], half[1], half[2]) * scale) ** 2
     f = np.empty(3)
     square = 0.0
     for axis in range(3):
         square += (q[axis] - c[axis]) ** 2 + half[axis] ** 2
-    n = end
-    for entry in range(begin, end):
-        if scores[entry - begin] > bound:
-            continue
+    n = 0
+    for number in range(n_chosen):
+        entry = chosen[number]
         if rows[9, entry] > large:
             foot(frames[slots[entry]], c, f)
             gain = -square
@@ -186,8 +196,20 @@ def keep(rows, slots, begin, end, frames, scale, bound, margin, c, half, q, scor
                 gain += (f[axis] - c[axis]) ** 2 - 2.0 * half[axis] * abs(q[axis] - f[axis])
             if gain > margin:
                 continue
-        for row in range(N_ROWS):
-            rows[row, n] = rows[row, entry]
-        slots[n] = slots[entry]
+        chosen[n] = entry
         n += 1
     return n
+
+
+@njit(cache=True, nogil=True)
+def keep(rows, slots, begin, end, frames, scale, bound, margin, c, half, q, scores, chosen):
+    """Append to the lists the entries begin..end that the block needs; return the new end."""
+    n = select(scores, begin, end, bound, chosen)
+    n = _drop_large(rows, slots, frames, scale, margin, c, half, q, chosen, n)
+    for row in range(N_ROWS):
+        values = rows[row]
+        for number in range(n):
+            values[end + number] = values[chosen[number]]
+    for number in range(n):
+        slots[end + number] = slots[chosen[number]]
+    return end + n

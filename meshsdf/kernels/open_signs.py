@@ -13,8 +13,8 @@ from numba import njit
 from .boundary_change import change
 from .boundary_winding import boundary_term
 
-COARSE = 1e-3  # error allowed per expansion, in units of W
-FINE = 1e-5
+COARSE = 2e-4  # error allowed per expansion, in units of W
+FINE = 1e-8
 # A hole's membrane may lie in a plane of nodes; all of them are then outside, rounding or not
 HALF = 0.5 + 1e-9
 # Along a line through the cube the slope at the centre is off by the derivative's bound times the
@@ -160,16 +160,18 @@ def _part(number, side):
 
 
 @njit(cache=True, nogil=True)
-def wind_bricks(boundary, coordinates, counts, membrane, inside, uncertain):
+def wind_bricks(boundary, coordinates, counts, membrane, only_whole, inside, uncertain):
     """Fill ``inside`` (b, 512) bool; ``uncertain[b]`` counts nodes with ||W| - 1/2| < membrane.
 
-    ``coordinates`` (b, 3) int64 are local bricks, ``counts`` (b, 512) int32 their N.
+    ``coordinates`` (b, 3) int64 are local bricks, ``counts`` (b, 512) int32 their N. With
+    ``only_whole``, ``uncertain`` is -1 for bricks that cannot be decided at once.
     """
     for b in range(len(coordinates)):
         corner = (8 * coordinates[b, 0], 8 * coordinates[b, 1], 8 * coordinates[b, 2])
         n = _settle_block(boundary, corner, (0, 0, 0), 8, counts[b], membrane, inside[b])
-        uncertain[b] = max(n, 0)
-        if n < 0:
+        uncertain[b] = n
+        if n < 0 and not only_whole:
+            uncertain[b] = 0
             for eighth in range(8):
                 start = _part(eighth, 4)
                 uncertain[b] += _wind_eighth(

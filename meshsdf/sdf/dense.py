@@ -35,7 +35,7 @@ def mesh_to_grid(
     Notes
     -----
     Accuracy: every value is the Euclidean distance rounded to float32, near and far.
-    Cost: about a tenth of a closest-point query per node outside the band, for triangles of a
+    Cost: about a seventh of a closest-point query per node outside the band, for triangles of a
     voxel's size; in proportion to their number where they are smaller.
     Method: see `kernels.far_lists`; nothing is propagated from node to node.
     """

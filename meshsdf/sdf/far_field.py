@@ -9,7 +9,7 @@ from ..kernels.parallel import even_ranges, run_pieces
 from ..progress import Progress
 from ..spatial.closest_point import ClosestPoint
 
-MAX_PIECES = 512  # enough for progress, Ctrl-C and an even load
+MAX_PIECES = 128  # enough for progress, Ctrl-C and an even load
 BYTES_PER_FACE = 700  # the tree, corners in its order, and the lists of two threads
 # Squares and witnesses err by at most 1600 u S^2, u = 2**-53 and S the largest coordinate:
 # 160 for the sums of `far_lists`, 4 sqrt(3) S * 200 u S for a witness (`point_triangle`)

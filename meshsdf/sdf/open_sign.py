@@ -34,9 +34,12 @@ def sign_by_winding_number(
     Notes
     -----
     Accuracy: distances are untouched. The sign is that of the exact generalised winding number,
-    up to rounding (1e-12, or more within 1e-6 voxels of a boundary edge); nodes of one missing
-    region get one sign, that of its first brick. ``uncertain_voxels`` counts the nodes of bricks
-    at which it is nearer to 1/2 than 0.05. Nodes within 1e-9 of 1/2 are outside.
+    up to rounding (1e-12, or more within 1e-6 voxels of a boundary edge); nodes within 1e-9 of
+    1/2 are outside. Near more than a thousand boundary edges, nodes whose number is not within
+    0.01 of 1/2 by libigl's approximation (its error has no proven bound; 4e-3 is the largest
+    seen) are not evaluated exactly. Nodes of one missing region get one sign, that of its first
+    brick. ``uncertain_voxels`` counts the nodes of bricks at which the number is nearer to 1/2
+    than 0.05.
     """
     winding = LatticeWinding(placed, band.index)
     own, n_uncertain = winding.first_sides(progress)
