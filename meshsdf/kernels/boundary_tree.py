@@ -108,19 +108,24 @@ def measure_nodes(points, chain, nodes, data):
                     box[HIGH + axis] = max(box[HIGH + axis], x)
         for axis in range(3):
             box[HUB + axis] = 0.5 * (box[LOW + axis] + box[HIGH + axis])
-        hub = box[HUB : HUB + 3]
         for e in range(first, last + is_piece):
+            # The last edge of a piece is the chord back to its first vertex
+            v = chain[e, 0] if e < last else chain[last - 1, 1]
+            w = chain[e, 1] if e < last else chain[first, 0]
+            ax, bx = points[v, 0] - box[HUB], points[w, 0] - box[HUB]
+            ay, by = points[v, 1] - box[HUB + 1], points[w, 1] - box[HUB + 1]
+            az, bz = points[v, 2] - box[HUB + 2], points[w, 2] - box[HUB + 2]
             if e < last:
-                a, b = points[chain[e, 0]] - hub, points[chain[e, 1]] - hub
-                box[LENGTH] += np.sqrt(((b - a) ** 2).sum())
-                box[RADIUS] = max(box[RADIUS], np.sqrt((a**2).sum()), np.sqrt((b**2).sum()))
-            else:
-                a, b = points[chain[last - 1, 1]] - hub, points[chain[first, 0]] - hub
-            area_x = 0.5 * (a[1] * b[2] - a[2] * b[1])
-            area_y = 0.5 * (a[2] * b[0] - a[0] * b[2])
-            area_z = 0.5 * (a[0] * b[1] - a[1] * b[0])
+                squared = (bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2
+                box[LENGTH] += np.sqrt(squared)
+            from_hub = ax * ax + ay * ay + az * az
+            to_hub = bx * bx + by * by + bz * bz
+            box[RADIUS] = max(box[RADIUS], np.sqrt(max(from_hub, to_hub)))
+            area_x = 0.5 * (ay * bz - az * by)
+            area_y = 0.5 * (az * bx - ax * bz)
+            area_z = 0.5 * (ax * by - ay * bx)
             area = np.sqrt(area_x * area_x + area_y * area_y + area_z * area_z)
-            x, y, z = (a + b) / 3.0
+            x, y, z = (ax + bx) / 3.0, (ay + by) / 3.0, (az + bz) / 3.0
             box[AREA] += area_x
             box[AREA + 1] += area_y
             box[AREA + 2] += area_z
@@ -131,5 +136,5 @@ def measure_nodes(points, chain, nodes, data):
             box[MOMENT + 4] += 0.5 * (area_x * z + area_z * x)
             box[MOMENT + 5] += 0.5 * (area_y * z + area_z * y)
             box[FAN_AREA] += area
-            squares = (a * a).sum() + (b * b).sum() + (a * b).sum()
-            box[SECOND] += area * squares / 6.0
+            mixed = ax * bx + ay * by + az * bz
+            box[SECOND] += area * (from_hub + to_hub + mixed) / 6.0

@@ -57,11 +57,11 @@ def _is_clear(wound, error, membrane):
 @njit(cache=True, nogil=True)
 def _winding(boundary, p, count, membrane):
     """W at p, exact enough to compare its magnitude with 1/2 and with 1/2 +- membrane."""
-    value, error = boundary_term(boundary, p, COARSE)
-    if not _is_clear(count + value, error, membrane):
-        value, error = boundary_term(boundary, p, FINE)
-        if not _is_clear(count + value, error, membrane):
-            value, error = boundary_term(boundary, p, 0.0)
+    value = 0.0
+    for tolerance in (COARSE, FINE, 0.0):
+        value, error = boundary_term(boundary, p, tolerance)
+        if _is_clear(count + value, error, membrane):
+            break
     return count + value
 
 
@@ -92,25 +92,23 @@ def _settle_block(boundary, corner, first, side, counts, membrane, inside):
     x, y = float(corner[0] + first[0]), float(corner[1] + first[1])
     z = float(corner[2] + first[2]) + half
     center = (x + half, y + half, z)
-    value, error = 0.0, np.inf
-    _, spread, linear, is_cut = change(boundary, center, half, QUICK[0], QUICK[1])
-    if spread + linear < 0.5 - membrane and not is_cut:
-        value, error = boundary_term(boundary, center, COARSE)
-        spread += linear + error
-        if _settle_evenly(counts, first, side, value, spread, membrane, inside):
-            return 0
     limit = BENT[0] if side == 8 else BENT[1] if side == 4 else BENT[2]
-    slope, bent, linear, is_cut = change(boundary, center, half, limit, SMALL)
-    if bent == np.inf:
-        return -1
-    if not is_cut:
+    value, error = 0.0, np.inf
+    for is_quick in (True, False):
+        most, small = QUICK if is_quick else (limit, SMALL)
+        slope, bent, linear, is_cut = change(boundary, center, half, most, small)
+        if is_quick and (is_cut or bent + linear >= 0.5 - membrane):
+            continue
+        if bent == np.inf:
+            return -1
+        if is_cut:
+            bent *= ALONG_LINE
+            continue
         if error == np.inf:
             value, error = boundary_term(boundary, center, COARSE)
         spread = bent + linear + error
         if _settle_evenly(counts, first, side, value, spread, membrane, inside):
             return 0
-    else:
-        bent *= ALONG_LINE
     uncertain = 0
     for i in range(side):
         for j in range(side):

@@ -38,7 +38,8 @@ class Boundary:
         net = table.net_uses
         line_of_edge = np.full(len(net), -1, np.int32)
         if len(placed.edge_line):
-            line_of_edge[table.edge_of_corner] = placed.edge_line
+            used = table.edge_of_corner >= 0
+            line_of_edge[table.edge_of_corner[used]] = placed.edge_line[used]
         edge = np.repeat(np.arange(len(net)), np.abs(net))
         chain = np.where((net[edge] > 0)[:, None], table.edges[edge], table.edges[edge, ::-1])
         order, loop = _loops(chain, placed.points)

@@ -127,7 +127,9 @@ class LatticeWinding:
         count(placed.line_ends, ids, BRICK * slab[0], BRICK * slab[1], *tables)
         return crossings
 
-    def _wind(self, local: np.ndarray, counts: np.ndarray, states: "_States", a: int, b: int):
+    def _wind(
+        self, local: np.ndarray, counts: np.ndarray, states: "_States", a: int, b: int
+    ) -> None:
         """Decide bricks a ... b - 1, all or, in a soup, those that are easy."""
         many = len(self.boundary.chain) > MANY_EDGES
         inside, uncertain = states.inside[a:b], states.uncertain[a:b]

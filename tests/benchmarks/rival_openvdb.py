@@ -1,9 +1,10 @@
-"""Run by the system's Python: OBJ to a level set with OpenVDB, timed inside and written as .vdb.
+"""Run by the system's Python: a mesh to a level set with OpenVDB, timed around the call.
 
-Usage: rival_openvdb.py MESH.obj OUT.vdb RESOLUTION [REPEATS]; prints one JSON object.
+Usage: rival_openvdb.py MESH.obj|MESH.npz OUT.vdb|- RESOLUTION; prints one JSON object.
 """
 
 import json
+import resource
 import sys
 import time
 
@@ -24,20 +25,25 @@ def read_obj(path):
     return points, np.array(corners, np.int64).astype(np.uint32) - 1
 
 
-def main(mesh, out, resolution, repeats="1"):
-    points, triangles = read_obj(mesh)
+def read_npz(path):
+    """Positions and triangles as numpy wrote them."""
+    with np.load(path) as data:
+        return data["points"].astype(np.float32), data["faces"].astype(np.uint32)
+
+
+def main(mesh, out, resolution):
+    points, triangles = (read_npz if mesh.endswith(".npz") else read_obj)(mesh)
     size = float((points.max(0) - points.min(0)).max()) / float(resolution)
     transform = vdb.createLinearTransform(voxelSize=size)
-    seconds = []
-    for _ in range(int(repeats)):
-        begin = time.perf_counter()
-        grid = vdb.FloatGrid.createLevelSetFromPolygons(
-            points, triangles=triangles, transform=transform, halfWidth=3.0
-        )
-        seconds.append(time.perf_counter() - begin)
+    begin = time.perf_counter()
+    grid = vdb.FloatGrid.createLevelSetFromPolygons(
+        points, triangles=triangles, transform=transform, halfWidth=3.0
+    )
+    seconds = time.perf_counter() - begin
     if out != "-":
         vdb.write(out, grids=[grid])
-    print(json.dumps({"seconds": seconds, "active_voxels": grid.activeVoxelCount()}))
+    peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(json.dumps({"seconds": seconds, "n_active": grid.activeVoxelCount(), "peak": peak}))
 
 
 main(*sys.argv[1:])
