@@ -127,54 +127,44 @@ def _settle_block(boundary, corner, first, side, counts, membrane, inside):
 
 
 @njit(cache=True, nogil=True)
-def _wind_eighth(boundary, corner, start, counts, membrane, inside):
-    """Decide 4^3 nodes: at once, by 2^3, or one by one; return how many are uncertain."""
-    n = _settle_block(boundary, corner, start, 4, counts, membrane, inside)
-    if n >= 0:
-        return n
-    uncertain = 0
-    for part in range(8):
-        i, j, k = _part(part, 2)
-        first = (start[0] + i, start[1] + j, start[2] + k)
-        n = _settle_block(boundary, corner, first, 2, counts, membrane, inside)
-        if n >= 0:
-            uncertain += n
-            continue
-        for single in range(8):
-            i, j, k = _part(single, 1)
-            i, j, k = first[0] + i, first[1] + j, first[2] + k
-            node = 64 * i + 8 * j + k
-            p = (float(corner[0] + i), float(corner[1] + j), float(corner[2] + k))
-            wound = abs(_winding(boundary, p, counts[node], membrane))
-            inside[node] = wound > HALF
-            uncertain += abs(wound - HALF) < membrane
-    return uncertain
-
-
-@njit(cache=True, nogil=True)
-def _part(number, side):
-    """First node of one of the eight cubes that make up a cube."""
-    return side * (number >> 2), side * ((number >> 1) & 1), side * (number & 1)
-
-
-@njit(cache=True, nogil=True)
 def wind_bricks(boundary, coordinates, counts, membrane, only_whole, inside, uncertain):
     """Fill ``inside`` (b, 512) bool; ``uncertain[b]`` counts nodes with ||W| - 1/2| < membrane.
 
     ``coordinates`` (b, 3) int64 are local bricks, ``counts`` (b, 512) int32 their N. With
     ``only_whole``, ``uncertain`` is -1 for bricks that cannot be decided at once.
     """
+    todo = np.empty((32, 4), np.int64)  # first node and side of cubes: 1 + 3 levels of 7 more
     for b in range(len(coordinates)):
         corner = (8 * coordinates[b, 0], 8 * coordinates[b, 1], 8 * coordinates[b, 2])
-        n = _settle_block(boundary, corner, (0, 0, 0), 8, counts[b], membrane, inside[b])
-        uncertain[b] = n
-        if n < 0 and not only_whole:
-            uncertain[b] = 0
-            for eighth in range(8):
-                start = _part(eighth, 4)
-                uncertain[b] += _wind_eighth(
-                    boundary, corner, start, counts[b], membrane, inside[b]
-                )
+        uncertain[b] = 0
+        todo[0] = 0
+        todo[0, 3] = 8
+        n_todo = 1
+        while n_todo > 0:
+            n_todo -= 1
+            first, side = (todo[n_todo, 0], todo[n_todo, 1], todo[n_todo, 2]), todo[n_todo, 3]
+            if side == 1:
+                node = 64 * first[0] + 8 * first[1] + first[2]
+                x, y, z = corner[0] + first[0], corner[1] + first[1], corner[2] + first[2]
+                p = (float(x), float(y), float(z))
+                wound = abs(_winding(boundary, p, counts[b, node], membrane))
+                inside[b, node] = wound > HALF
+                uncertain[b] += abs(wound - HALF) < membrane
+                continue
+            n = _settle_block(boundary, corner, first, side, counts[b], membrane, inside[b])
+            if n >= 0:
+                uncertain[b] += n
+                continue
+            if only_whole:
+                uncertain[b] = -1
+                break
+            side //= 2
+            for part in range(8):
+                todo[n_todo, 0] = first[0] + side * (part >> 2)
+                todo[n_todo, 1] = first[1] + side * ((part >> 1) & 1)
+                todo[n_todo, 2] = first[2] + side * (part & 1)
+                todo[n_todo, 3] = side
+                n_todo += 1
 
 
 @njit(cache=True, nogil=True)
