@@ -1,4 +1,4 @@
-"""What all tests share: examples of Hypothesis are the same in every run and may take their time."""
+"""What all tests share: the examples of Hypothesis are the same in every run."""
 
 from hypothesis import settings
 
