@@ -12,6 +12,19 @@ from .clip import clip_line, triangle_range
 
 
 @njit(cache=True, nogil=True)
+def _slab_of(x, edges):
+    """The slab [edges[s], edges[s + 1]) that holds x, or the nearest; slabs are nearly equal."""
+    n_slabs = len(edges) - 1
+    guess = np.int64((x - edges[0]) * n_slabs / (edges[n_slabs] - edges[0]))
+    s = min(max(guess, 0), n_slabs - 1)
+    while s > 0 and x < edges[s]:
+        s -= 1
+    while s < n_slabs - 1 and x >= edges[s + 1]:
+        s += 1
+    return s
+
+
+@njit(cache=True, nogil=True)
 def bin_by_x(low, high, edges, start, items, n_items):
     """CSR lists of the items whose [low, high] meets slab s = [edges[s], edges[s + 1]).
 
@@ -24,9 +37,7 @@ def bin_by_x(low, high, edges, start, items, n_items):
     if not fill:
         start[:] = 0
     for item in range(n_items):
-        first = max(0, np.searchsorted(edges, low[item], side="right") - 1)
-        last = min(n_slabs - 1, np.searchsorted(edges, high[item], side="right") - 1)
-        for s in range(first, last + 1):
+        for s in range(_slab_of(low[item], edges), _slab_of(high[item], edges) + 1):
             if fill:
                 items[place[s]] = item
                 place[s] += 1
