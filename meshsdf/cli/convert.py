@@ -90,9 +90,8 @@ def command(
     facts = volume.facts()
     if facts.get("uncertain_voxels"):
         n = plural(facts["uncertain_voxels"], "voxel")
-        console.warn(
-            f"{n} near the membranes of openings: the winding number is within 0.05 of 1/2"
-        )
+        where = "near the membranes of openings: the winding number is within 0.05 of 1/2"
+        console.warn(f"{n} {'nearer than that' if choice.by_crossings else where}")
     seconds = console.timings("load", "check", "bricks", "distance", "far field", "sign", "write")
     seconds["distance"] += seconds.pop("bricks") + seconds.pop("far field")
     console.result(_words(mesh, out, facts, choice, loaded, seconds["total"]))

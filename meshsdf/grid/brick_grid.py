@@ -52,7 +52,8 @@ class NarrowBand:
         Weights of the face's second and third corner at the closest point.
     uncertain_voxels : int or None
         Of an open mesh: at how many nodes the winding number is within 0.05 of 1/2, so that the
-        side depends on how one thinks of the openings as filled.
+        side depends on how one thinks of the openings as filled. Of a mesh whose cracks were
+        zipped: how many nodes lie so near the surface that their side is not proved.
     """
 
     index: BrickIndex

@@ -133,16 +133,19 @@ def wind_bricks(boundary, coordinates, counts, membrane, only_whole, inside, unc
     ``coordinates`` (b, 3) int64 are local bricks, ``counts`` (b, 512) int32 their N. With
     ``only_whole``, ``uncertain`` is -1 for bricks that cannot be decided at once.
     """
-    todo = np.empty((32, 4), np.int64)  # first node and side of cubes: 1 + 3 levels of 7 more
+    cubes = np.empty((32, 4), np.int64)  # first node and side of cubes: 1 + 3 levels of 7 more
     for b in range(len(coordinates)):
         corner = (8 * coordinates[b, 0], 8 * coordinates[b, 1], 8 * coordinates[b, 2])
         uncertain[b] = 0
-        todo[0] = 0
-        todo[0, 3] = 8
-        n_todo = 1
-        while n_todo > 0:
-            n_todo -= 1
-            first, side = (todo[n_todo, 0], todo[n_todo, 1], todo[n_todo, 2]), todo[n_todo, 3]
+        cubes[0] = 0
+        cubes[0, 3] = 8
+        n_left = 1
+        while n_left > 0:
+            n_left -= 1
+            first, side = (
+                (cubes[n_left, 0], cubes[n_left, 1], cubes[n_left, 2]),
+                cubes[n_left, 3],
+            )
             if side == 1:
                 node = 64 * first[0] + 8 * first[1] + first[2]
                 x, y, z = corner[0] + first[0], corner[1] + first[1], corner[2] + first[2]
@@ -160,11 +163,11 @@ def wind_bricks(boundary, coordinates, counts, membrane, only_whole, inside, unc
                 break
             side //= 2
             for part in range(8):
-                todo[n_todo, 0] = first[0] + side * (part >> 2)
-                todo[n_todo, 1] = first[1] + side * ((part >> 1) & 1)
-                todo[n_todo, 2] = first[2] + side * (part & 1)
-                todo[n_todo, 3] = side
-                n_todo += 1
+                cubes[n_left, 0] = first[0] + side * (part >> 2)
+                cubes[n_left, 1] = first[1] + side * ((part >> 1) & 1)
+                cubes[n_left, 2] = first[2] + side * (part & 1)
+                cubes[n_left, 3] = side
+                n_left += 1
 
 
 @njit(cache=True, nogil=True)

@@ -1,5 +1,7 @@
 """The signed distance transform of a mesh, in a narrow band around it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays import Number, Vector3
@@ -107,13 +109,24 @@ def mesh_to_band(
     band = builder.build()
     if choice.by_crossings:
         _check_leaks(sum(builder.leaks))
-        return band
+        beyond = None if report.repair is None else report.repair.certain_beyond
+        if beyond is None:
+            return band
+        return replace(band, uncertain_voxels=_count_near(band, beyond))
     if choice.method == "unsigned":
         return band
     signed = sign_by_winding_number(band, placed, max_memory=max_memory, progress=progress)
     if sign == "auto" and not (signed.values < 0).any():
         return band  # nothing is wound about: a sheet
     return signed
+
+
+def _count_near(band: NarrowBand, distance: float) -> int:
+    """Active nodes no further than ``distance`` (world units) from the surface."""
+    near = 0
+    for slot in np.flatnonzero(np.abs(band.values).min(axis=(1, 2, 3)) <= distance):
+        near += int((np.abs(band.values[slot]) <= distance).sum())
+    return near
 
 
 def check_half_width(half_width: Number) -> None:

@@ -38,6 +38,7 @@ def test_signs_beyond_the_certificate_are_those_of_the_whole_ball():
     assert band.sign == "winding"
     points, values = band.to_world(band.active_ijk()), band.active_values()
     beyond = check(mesh, self_intersections=False).repair.certain_beyond
+    assert band.uncertain_voxels == (np.abs(values) <= beyond).sum() > 0
     clear = (np.abs(values) > beyond) & (np.abs(np.linalg.norm(points, axis=1) - 1) > 0.02)
     assert clear.sum() > 1000
     assert ((values < 0) == (np.linalg.norm(points, axis=1) < 1))[clear].all()
