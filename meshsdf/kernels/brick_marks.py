@@ -25,19 +25,34 @@ def _slab_of(x, edges):
 
 
 @njit(cache=True, nogil=True)
-def bin_by_x(low, high, edges, start, items, n_items):
-    """CSR lists of the items whose [low, high] meets slab s = [edges[s], edges[s + 1]).
+def slab_ranges(points, corners, reach, edges, first, last):
+    """``first[n], last[n]`` = slabs at the ends of the x extent of ``corners[n]``, grown by reach.
+
+    Slab s is [edges[s], edges[s + 1]). The ranges are int16 (n,): they are the largest arrays of a
+    conversion when faces are many.
+    """
+    for n in range(len(corners)):
+        x0, x1 = np.inf, -np.inf
+        for c in range(corners.shape[1]):
+            x = points[corners[n, c], 0]
+            x0, x1 = min(x0, x), max(x1, x)
+        first[n], last[n] = _slab_of(x0 - reach, edges), _slab_of(x1 + reach, edges)
+
+
+@njit(cache=True, nogil=True)
+def bin_by_slab(first, last, start, items):
+    """CSR lists of the items whose range of slabs holds slab s.
 
     Two passes: with ``items`` empty it only counts into ``start`` (n_slabs + 1,); call again with
     ``items`` of length ``start[-1]`` to fill.
     """
-    n_slabs = len(edges) - 1
+    n_slabs = len(start) - 1
     fill = len(items) > 0
     place = start.copy()
     if not fill:
         start[:] = 0
-    for item in range(n_items):
-        for s in range(_slab_of(low[item], edges), _slab_of(high[item], edges) + 1):
+    for item in range(len(first)):
+        for s in range(first[item], last[item] + 1):
             if fill:
                 items[place[s]] = item
                 place[s] += 1
@@ -46,17 +61,6 @@ def bin_by_x(low, high, edges, start, items, n_items):
     if not fill:
         for s in range(n_slabs):
             start[s + 1] += start[s]
-
-
-@njit(cache=True, nogil=True)
-def extents_x(points, corners, reach, low, high):
-    """``low[n], high[n]`` = x extent of the points named by ``corners[n]``, grown by reach."""
-    for n in range(len(corners)):
-        x0, x1 = np.inf, -np.inf
-        for c in range(corners.shape[1]):
-            x = points[corners[n, c], 0]
-            x0, x1 = min(x0, x), max(x1, x)
-        low[n], high[n] = x0 - reach, x1 + reach
 
 
 @njit(cache=True, nogil=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..kernels.brick_marks import bin_by_x, extents_x
+from ..kernels.brick_marks import bin_by_slab, slab_ranges
 
 
 def bin_features(
@@ -19,12 +19,12 @@ def bin_features(
     reach : float
         Voxels by which features are grown.
     """
-    low, high = np.empty(len(corners)), np.empty(len(corners))
-    extents_x(points, corners, reach, low, high)
+    first, last = np.empty((2, len(corners)), np.int16)
+    slab_ranges(points, corners, reach, edges, first, last)
     start = np.zeros(len(edges), np.int64)
-    bin_by_x(low, high, edges, start, np.empty(0, np.int32), len(corners))
+    bin_by_slab(first, last, start, np.empty(0, np.int32))
     items = np.empty(start[-1], np.int32)
-    bin_by_x(low, high, edges, start, items, len(corners))
+    bin_by_slab(first, last, start, items)
     return start, items
 
 
