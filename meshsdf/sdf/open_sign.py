@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Number
 from ..grid import BrickIndex, NarrowBand
+from ..kernels.brick_finish import NEGATIVE_ZERO
 from ..kernels.open_signs import HALF
 from ..kernels.sign_changes import mark_mixed_faces
 from ..progress import Progress
@@ -134,6 +135,7 @@ def _signed(
 
     values = spread(band.values, band.background)
     np.negative(values, out=values, where=inside)
+    values[inside & (values == 0)] = NEGATIVE_ZERO
     return replace(
         band,
         index=index,

@@ -295,3 +295,20 @@ def test_open_scans_have_exact_signs(name):
     band = mesh_to_band(mesh, resolution=64, sign="winding")
     compare(mesh, band, np.random.default_rng(0))
     assert check(marching_cubes(band), self_intersections=False).two_set
+
+
+def test_inner_nodes_on_a_wall_keep_their_sign():
+    # Two open boxes that overlap, walls on lattice planes: inside the union distance 0 is inside
+    one, two = box_mesh(), box_mesh(center=(0.5, 0.0, 0.0))
+    top = [
+        f for f in range(12) if np.ptp(one.triangles[f, :, 2]) == 0 and one.triangles[f, 0, 2] > 0
+    ]
+    both = Mesh(
+        np.concatenate([one.vertices, two.vertices]),
+        np.concatenate([np.delete(one.faces, top[0], axis=0), two.faces + 8]),
+    )
+    band = mesh_to_band(both, voxel_size=1 / 16)
+    assert band.uncertain_voxels is not None
+    assert (
+        band.value_at(np.array([[0, 0, -4]]))[0] < 0
+    )  # the wall x = 0 of the second, in the first
