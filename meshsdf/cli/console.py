@@ -15,6 +15,8 @@ from ..errors import IoError
 
 YES, NO, MISUSE, UNUSABLE, INTERRUPTED = 0, 1, 2, 3, 130
 BAR_AFTER = 1.0  # seconds of work before a progress bar appears
+CTRL_C = threading.Event()
+"""Set once Ctrl-C was pressed: Python drops the exception if it strikes in its own callbacks."""
 
 
 class Console:
@@ -94,7 +96,9 @@ class Console:
         self._count(name)
 
     def progress(self, stage: str, fraction: float) -> None:
-        """The callback that library functions report to."""
+        """The callback that library functions report to; raises Ctrl-C again if it was lost."""
+        if CTRL_C.is_set():
+            raise KeyboardInterrupt
         self._count(stage)
         self._show(stage, fraction)
 

@@ -5,6 +5,7 @@ used or would not fit in memory; 130 interrupted.
 """
 
 import os
+import signal
 import sys
 import traceback
 import warnings
@@ -14,7 +15,7 @@ from pathlib import Path
 import click
 
 from ..errors import MemoryLimitError, MeshsdfError
-from .console import INTERRUPTED, UNUSABLE
+from .console import CTRL_C, INTERRUPTED, UNUSABLE
 
 COMMANDS = {
     "check": "Does a mesh part space into inside and outside? Says where it does not.",
@@ -92,11 +93,17 @@ def main() -> None:
     if sys.stdout is not None:
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be any bytes
     warnings.simplefilter("ignore", RuntimeWarning)  # overflow is judged where it matters
+    signal.signal(signal.SIGINT, _on_ctrl_c)
     code = run(sys.argv[1:])
     if code == INTERRUPTED:
         # At once: the interpreter's own way out forgets the code if an import was interrupted
         os._exit(code)
     sys.exit(code)
+
+
+def _on_ctrl_c(number: int, frame: object) -> None:
+    CTRL_C.set()
+    raise KeyboardInterrupt
 
 
 class _InterruptedError(Exception):

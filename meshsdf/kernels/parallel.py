@@ -24,7 +24,7 @@ def run_pieces(
     """Call ``work(0) ... work(n_pieces - 1)``, each once, on all cores.
 
     The first exception stops the rest: pieces not yet begun are dropped, those begun are waited
-    for, and the exception is raised here.
+    for, and the exception is raised here. Ctrl-C waits for nothing: a piece may be compiling.
     """
     threads = min(n_threads(), n_pieces)
     if threads <= 1:
@@ -32,20 +32,20 @@ def run_pieces(
             work(piece)
             progress(stage, (piece + 1) / n_pieces)
         return
-    with ThreadPoolExecutor(threads) as pool:
+    pool = ThreadPoolExecutor(threads)
+    try:
         pending = {pool.submit(work, piece) for piece in range(n_pieces)}
-        try:
-            n_done = 0
-            while pending:
-                done, pending = wait(pending, return_when=FIRST_COMPLETED)
-                for future in done:
-                    future.result()
-                n_done += len(done)
-                progress(stage, n_done / n_pieces)
-        except BaseException:
-            for future in pending:
-                future.cancel()
-            raise
+        n_done = 0
+        while pending:
+            done, pending = wait(pending, return_when=FIRST_COMPLETED)
+            for future in done:
+                future.result()
+            n_done += len(done)
+            progress(stage, n_done / n_pieces)
+    except BaseException as error:
+        pool.shutdown(wait=not isinstance(error, KeyboardInterrupt), cancel_futures=True)
+        raise
+    pool.shutdown()
 
 
 def even_ranges(n_items: int, n_pieces: int) -> list[tuple[int, int]]:

@@ -4,9 +4,12 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
+
+from meshsdf.cli.console import Console
 
 from .examples import ball
 
@@ -62,3 +65,11 @@ def test_ctrl_c_while_a_file_is_written_removes_what_was_written(cli, tmp_path, 
     assert outcome.code == 130
     assert outcome.err.strip().splitlines()[-1] == "interrupted; nothing is left half written"
     assert os.listdir(tmp_path) == ["ball.ply"]
+
+
+def test_an_interrupt_that_python_dropped_is_raised_at_the_next_progress(monkeypatch):
+    pressed = threading.Event()
+    monkeypatch.setattr("meshsdf.cli.console.CTRL_C", pressed)
+    pressed.set()
+    with pytest.raises(KeyboardInterrupt):
+        object.__new__(Console).progress("edges", 1.0)  # one made whole needs a running command
