@@ -32,3 +32,17 @@ BrickBarycentrics = Float32[np.ndarray, "b 8 8 8 2"]
 BrickCoordinates = Int64[np.ndarray, "b 3"]
 RootTable = Int32[np.ndarray, "px py pz"]
 PageTable = Int32[np.ndarray, "p 16 16 16"]
+
+
+def writable_alias(array: np.ndarray) -> np.ndarray:
+    """The same memory without its write protection, or a copy if its owner is protected too.
+
+    Kernels are compiled anew for read-only arrays. They write to nothing but their outputs, so
+    they may have an input by this name.
+    """
+    alias = array.view()
+    try:
+        alias.flags.writeable = True
+    except ValueError:
+        return array.copy()
+    return alias

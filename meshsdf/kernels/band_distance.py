@@ -9,7 +9,7 @@ so the work is about one test per node of the band. The conditions are necessary
 soup: every face at an edge, and every edge at a vertex, adds its own half-space.
 
 Exactness: a region is widened by a slack that covers the rounding of its planes, so the closest
-feature of a node is never missed; edge and vertex tests measure the true distance wherever they
+feature of a node is never missed (flat edges, which have no region, are left out: `folds`); edge and vertex tests measure the true distance wherever they
 are applied, and a face is measured by its plane at most `FACE_SLACK` (or the rounding of its
 plane) outside its prism. Faces thinner than `SLIVER` have no trustworthy plane: they are measured
 by their closest point in a capsule around their longest edge, and impose nothing on their edges.
@@ -23,11 +23,9 @@ from numba import njit
 
 from .brick_lookup import find_brick
 from .clip import add_half_space, clip_row, clip_rows, clip_segment, triangle_range
+from .folds import FACE_SLACK, SLIVER
 from .point_triangle import closest_on_triangle
 
-SLIVER = 1e-5  # altitude / longest edge
-FACE_SLACK = 1e-8  # voxels; covers prisms that part by less than a flat edge's wedge
-FLAT_EDGE = 1e-9  # sine of the wedge angle below which the two prisms cover the wedge
 SLACK = 1e-6  # voxels; generous, since edges and vertices measure the true distance
 MAX_FACES = 16  # half-spaces used per edge or vertex; leaving some out only widens the region
 SMALL = 4.0  # voxels; shorter features are bounded by their boxes along a line
@@ -110,8 +108,7 @@ def scan_edges(
         ux, uy, uz = lx / length, ly / length, lz / length
         n_in, f = _into_faces(points, faces, order, first[e], first[e + 1], a, ux, uy, uz, inward)
         n_faces = first[e + 1] - first[e]
-        if not _wedge_hull(inward, n_in == 2 and n_faces == 2, ux, uy, uz, reach, hull):
-            continue
+        _wedge_hull(inward, n_in == 2 and n_faces == 2, ux, uy, uz, reach, hull)
         # The wedge, relative to end a: outside its faces, between its ends
         k = 0
         for i in range(n_in):
@@ -249,19 +246,17 @@ def _into_faces(points, faces, order, begin, end, a, ux, uy, uz, inward):
 
 @njit(cache=True, nogil=True)
 def _wedge_hull(inward, is_regular, ux, uy, uz, reach, hull):
-    """Fill the box (x0, x1, y0, y1, z0, z1) of a wedge's cross-section; False if it is flat."""
+    """Fill the box (x0, x1, y0, y1, z0, z1) of a wedge's cross-section."""
     hull[0] = hull[2] = hull[4] = -reach
     hull[1] = hull[3] = hull[5] = reach
     if not is_regular:
-        return True
+        return
     p, q = inward[0], inward[1]
     # Rays that bound the wedge: across the edge, along each face's normal
     rx, ry, rz = uy * p[2] - uz * p[1], uz * p[0] - ux * p[2], ux * p[1] - uy * p[0]
     sx, sy, sz = uy * q[2] - uz * q[1], uz * q[0] - ux * q[2], ux * q[1] - uy * q[0]
     sine = rx * q[0] + ry * q[1] + rz * q[2]
     facing = p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-    if facing < 0.0 and abs(sine) < FLAT_EDGE:
-        return False
     if facing < -0.5:
         # The wedge opens by less than 60 degrees: its hull is small
         if sine > 0.0:
@@ -275,7 +270,6 @@ def _wedge_hull(inward, is_regular, ux, uy, uz, reach, hull):
         hull[3] = max(0.0, stretch * ry, stretch * sy) + SLACK
         hull[4] = min(0.0, stretch * rz, stretch * sz) - SLACK
         hull[5] = max(0.0, stretch * rz, stretch * sz) + SLACK
-    return True
 
 
 @njit(cache=True, nogil=True)

@@ -10,6 +10,8 @@ from numba import njit
 
 from .clip import clip_line, triangle_range
 
+FEW_CELLS = 27
+
 
 @njit(cache=True, nogil=True)
 def _slab_of(x, edges):
@@ -64,6 +66,47 @@ def bin_by_slab(first, last, start, items):
 
 
 @njit(cache=True, nogil=True)
+def _cells_within(a, b, c, reach, shift):
+    """The first and the last cell with a node within ``reach`` of three coordinates' range."""
+    first = np.int64(np.ceil(min(a, b, c) - reach - 1e-6)) >> shift
+    last = np.int64(np.floor(max(a, b, c) + reach + 1e-6)) >> shift
+    return max(first, 0), last
+
+
+@njit(cache=True, nogil=True)
+def _within(points, p, box):
+    """Tell whether point p lies in a box; a box of NaN holds none."""
+    x, y, z = points[p, 0], points[p, 1], points[p, 2]
+    return (
+        box[0, 0] <= x <= box[1, 0] and box[0, 1] <= y <= box[1, 1] and box[0, 2] <= z <= box[1, 2]
+    )
+
+
+@njit(cache=True, nogil=True)
+def _is_marked(root, pages, shift, x, y, z):
+    """Tell whether a cell is marked, or lies where nothing is to be marked."""
+    if shift == 7:
+        return y >= root.shape[1] or z >= root.shape[2] or root[x, y, z] == 0
+    px, py, pz = x >> 4, y >> 4, z >> 4
+    if py >= root.shape[1] or pz >= root.shape[2] or root[px, py, pz] < 0:
+        return True
+    return pages[root[px, py, pz], x & 15, y & 15, z & 15] == 0
+
+
+@njit(cache=True, nogil=True)
+def _are_marked(root, pages, shift, x0, x1, y0, y1, z0, z1):
+    """Tell whether a few cells, a box of them, are all marked."""
+    if (x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1) > FEW_CELLS:
+        return False
+    for x in range(x0, x1 + 1):
+        for y in range(y0, y1 + 1):
+            for z in range(z0, z1 + 1):
+                if not _is_marked(root, pages, shift, x, y, z):
+                    return False
+    return True
+
+
+@njit(cache=True, nogil=True)
 def mark_cells(points, faces, ids, reach, shift, cell0, cell1, root, pages):
     """Mark every cell with x coordinate in [cell0, cell1) that is near one of the faces ``ids``.
 
@@ -72,8 +115,24 @@ def mark_cells(points, faces, ids, reach, shift, cell0, cell1, root, pages):
     """
     side = 1 << shift
     half = 0.5 * (side - 1)
+    done = np.full((2, 3), np.nan)  # corners of a box in which all faces mark marked cells
     for n in range(len(ids)):
-        a, b, c = points[faces[ids[n], 0]], points[faces[ids[n], 1]], points[faces[ids[n], 2]]
+        p, q, r = faces[ids[n], 0], faces[ids[n], 1], faces[ids[n], 2]
+        if _within(points, p, done) and _within(points, q, done) and _within(points, r, done):
+            continue
+        a, b, c = points[p], points[q], points[r]
+        x0, x1 = _cells_within(a[0], b[0], c[0], reach, shift)
+        y0, y1 = _cells_within(a[1], b[1], c[1], reach, shift)
+        z0, z1 = _cells_within(a[2], b[2], c[2], reach, shift)
+        x0, x1 = max(cell0, x0), min(cell1 - 1, x1)
+        if _are_marked(root, pages, shift, x0, x1, y0, y1, z0, z1):
+            # As by far most small faces: marked by their neighbours
+            low, high = reach + 2e-6 - 1.0, side - reach - 2e-6
+            done[0, 0] = x0 * side + low if x0 > cell0 else -np.inf
+            done[1, 0] = x1 * side + high if x1 < cell1 - 1 else np.inf
+            done[0, 1], done[1, 1] = y0 * side + low, y1 * side + high
+            done[0, 2], done[1, 2] = z0 * side + low, z1 * side + high
+            continue
         ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
         vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -85,8 +144,6 @@ def mark_cells(points, faces, ids, reach, shift, cell0, cell1, root, pages):
         if flat:
             nx, ny, nz = nx / area, ny / area, nz / area
         grown = reach + half + 1e-6
-        x0 = max(cell0, np.int64(np.floor(min(a[0], b[0], c[0]) - reach) - side + 1) // side)
-        x1 = min(cell1 - 1, np.int64(np.floor(max(a[0], b[0], c[0]) + reach)) // side)
         z_min, z_max = min(a[2], b[2], c[2]) - grown, max(a[2], b[2], c[2]) + grown
         # Centre (cx, cy, cz) of a cell may lie this far from the plane of the face
         thick = reach + half * (abs(nx) + abs(ny) + abs(nz)) + 1e-6

@@ -25,9 +25,9 @@ def _minor(ax, ay, bx, by):
 
 
 @njit(cache=True, nogil=True)
-def classify_triples(points, triples, verdict):
-    """Fill ``verdict`` (n,) uint8 for point triples (n, 3); overflow counts as undecided."""
-    for t in range(len(triples)):
+def classify_triples(points, triples, start, stop, verdict):
+    """Fill ``verdict`` (n,) uint8 for triples [start, stop) of (n, 3); overflow is undecided."""
+    for t in range(start, stop):
         p, q, r = triples[t, 0], triples[t, 1], triples[t, 2]
         ax, bx = points[q, 0] - points[p, 0], points[r, 0] - points[p, 0]
         ay, by = points[q, 1] - points[p, 1], points[r, 1] - points[p, 1]

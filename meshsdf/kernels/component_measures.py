@@ -5,14 +5,16 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def measure_components(points, faces, component, center, n_faces, area, volume, lower, upper):
-    """Add every face to its component; faces of component -1 are left out.
+def measure_components(
+    points, faces, f0, f1, component, center, n_faces, area, volume, lower, upper
+):
+    """Add every face in [f0, f1) to its component; faces of component -1 are left out.
 
     n_faces, area, volume : (c,) of zeros; lower, upper : (c, 3) of +inf, -inf. Volumes are sums
     of tetrahedra with apex ``center``.
     """
     corner = np.empty((3, 3))
-    for f in range(len(faces)):
+    for f in range(f0, f1):
         c = component[f]
         if c < 0:
             continue

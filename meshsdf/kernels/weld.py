@@ -1,9 +1,10 @@
 """Number equal rows of integers, in order of first appearance, by open addressing.
 
-The table holds the first row of every number, at most half full, probed linearly. Rows are mixed
-by multiplication with odd constants (the golden ratio and two primes of the 64-bit FNV and
-xxHash families) and by folding the upper bits onto the lower ones; equality is always decided on
-the rows themselves, so the outcome does not depend on the mixing.
+The table holds the first row of every kind, at most half full, probed linearly. Rows fall into
+parts by their hashes; parts share nothing, so each may have a thread and a table of its own. Rows
+are mixed by multiplication with odd constants (the golden ratio and two primes of the 64-bit FNV
+and xxHash families) and by folding the upper bits onto the lower ones; equality is always decided
+on the rows themselves, so the outcome does not depend on the mixing.
 """
 
 import numpy as np
@@ -14,6 +15,7 @@ MIX_1 = np.uint64(0xC2B2AE3D27D4EB4F)
 MIX_2 = np.uint64(0x100000001B3)
 FOLD = np.uint64(29)
 LAST = np.uint64(32)
+HIGH = np.uint64(40)  # bits that choose the part, above those that choose the slot
 
 
 @njit(cache=True, nogil=True)
@@ -26,30 +28,47 @@ def _mixed(a, b, c):
 
 
 @njit(cache=True, nogil=True)
-def number_rows(rows, table, labels, first_row):
-    """Fill ``labels`` (n,) and ``first_row`` (up to n,); return how many rows differ.
+def find_first_rows(rows, part, n_parts, table, first):
+    """Fill ``first`` (n,) int32: the first row equal to each, for the rows that fall to ``part``.
 
-    rows : (n, 3) uint64; table : (2**k,) int32 filled with -1, 2**k >= 2 n.
+    rows : (n, 3) uint64; table : (2**k,) int32 filled with -1. Returns False, with the work undone,
+    if the table gets more than 7/8 full.
     """
     mask = np.uint64(len(table) - 1)
     step = np.uint64(1)
-    n_different = 0
+    free = len(table) - len(table) // 8
     for i in range(len(rows)):
         a, b, c = rows[i, 0], rows[i, 1], rows[i, 2]
-        slot = _mixed(a, b, c) & mask
+        h = _mixed(a, b, c)
+        if n_parts > 1 and (h >> HIGH) % np.uint64(n_parts) != np.uint64(part):
+            continue
+        slot = h & mask
         while True:
-            label = table[slot]
-            if label < 0:
-                table[slot] = n_different
-                first_row[n_different] = i
-                labels[i] = n_different
-                n_different += 1
+            j = table[slot]
+            if j < 0:
+                table[slot] = i
+                first[i] = i
+                free -= 1
+                if free == 0:
+                    return False
                 break
-            j = first_row[label]
             if rows[j, 0] == a and rows[j, 1] == b and rows[j, 2] == c:
-                labels[i] = label
+                first[i] = j
                 break
             slot = (slot + step) & mask
+    return True
+
+
+@njit(cache=True, nogil=True)
+def number_firsts(labels):
+    """Turn first rows into numbers, in place, in order of first appearance; how many there are."""
+    n_different = 0
+    for i in range(len(labels)):
+        if labels[i] == i:
+            labels[i] = n_different
+            n_different += 1
+        else:
+            labels[i] = labels[labels[i]]
     return n_different
 
 

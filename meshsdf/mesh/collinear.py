@@ -9,14 +9,17 @@ from jaxtyping import Int32, Integer
 
 from ..arrays import Points
 from ..kernels.collinear import ON_A_LINE, UNDECIDED, classify_triples
+from ..kernels.parallel import even_ranges, n_threads, run_pieces
 
 MANTISSA_BITS = 53
+TRIPLES_PER_PIECE = 2**16  # at least: less work than that is not worth a thread
 
 
 def are_collinear(points: Points, triples: Int32[np.ndarray, "t 3"]) -> np.ndarray:
     """Tell which triples of points lie on one line; equal points do. Exact for the given floats."""
     verdict = np.empty(len(triples), dtype=np.uint8)
-    classify_triples(points, triples, verdict)
+    ranges = even_ranges(len(triples), min(n_threads(), 1 + len(triples) // TRIPLES_PER_PIECE))
+    run_pieces(lambda p: classify_triples(points, triples, *ranges[p], verdict), len(ranges))
     collinear = verdict == ON_A_LINE
     undecided = np.flatnonzero(verdict == UNDECIDED)
     if len(undecided):

@@ -5,12 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int32
 
-from ..arrays import FaceLabels, Faces, Points
+from ..arrays import FaceLabels, Faces, Indices, Points
 from ..box import Box
 from ..kernels.component_measures import measure_components
-from ..kernels.edges import connect_faces
+from ..kernels.edges import join_corners, join_faces, join_forests, number_components
+from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from .edge_chain import ResidualLines
 from .edge_table import EdgeTable
+
+FACES_PER_SUM = 2**15
+MOST_SUMS = 16
+FACES_PER_FOREST = 2**16  # at least: joining forests costs as much as joining so many faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,19 +50,36 @@ class Component:
     box: Box
 
 
-def component_labels(table: EdgeTable, lines: ResidualLines | None) -> tuple[FaceLabels, int]:
+def component_labels(
+    table: EdgeTable, lines: ResidualLines | None = None
+) -> tuple[FaceLabels, int]:
     """Number the components in order of their first faces; -1 for faces that repeat a corner."""
-    edge_of_corner = table.edge_of_corner
+    faces, ties = table.faces, np.empty((0, 2), np.int32)
     if lines is not None and lines.is_odd.any():
-        alias = np.arange(len(table.edges) + 1, dtype=np.int32)
-        alias[-1] = -1
         tied = lines.is_odd & lines.is_closed_line()[lines.line]
         first_edge = np.zeros(lines.n_lines, dtype=np.int32)
         first_edge[lines.line[tied][::-1]] = lines.edge_index[tied][::-1]
-        alias[lines.edge_index[tied]] = first_edge[lines.line[tied]]
-        edge_of_corner = alias[edge_of_corner]
-    labels = np.empty(len(edge_of_corner), dtype=np.int32)
-    return labels, connect_faces(edge_of_corner, len(table.edges), labels)
+        ties = np.stack([lines.edge_index[tied], first_edge[lines.line[tied]]], axis=1)
+    # Where no vertex branches and nothing is tied, what a vertex joins is joined by edges too
+    by_vertex = len(ties) == 0 and not table.is_branching.any()
+    if by_vertex:
+        parent = _connected_vertices(faces, len(table.is_branching))
+    else:
+        parent = np.arange(len(faces), dtype=np.int32)
+        join_faces(table.half_edges, table.first, ties, parent)
+    labels = np.empty(len(faces), dtype=np.int32)
+    name = np.full(len(parent), -1, dtype=np.int32)
+    return labels, number_components(faces, parent, by_vertex, name, labels)
+
+
+def _connected_vertices(faces: Faces, n_vertices: int) -> Indices:
+    """A forest whose trees are the sets of vertices that faces connect."""
+    ranges = even_ranges(len(faces), min(n_threads(), 1 + len(faces) // FACES_PER_FOREST))
+    forests = np.tile(np.arange(n_vertices, dtype=np.int32), (len(ranges), 1))
+    run_pieces(lambda p: join_corners(faces, *ranges[p], forests[p]), len(ranges))
+    for other in forests[1:]:
+        join_forests(forests[0], other)
+    return forests[0]
 
 
 def describe_components(
@@ -68,10 +90,19 @@ def describe_components(
     if c == 0:
         return ()
     center = Box.around(points).center
-    n_faces = np.zeros(c, dtype=np.int64)
-    area, volume = np.zeros((2, c))
-    lower, upper = np.full((c, 3), np.inf), np.full((c, 3), -np.inf)
-    measure_components(points, faces, labels, center, n_faces, area, volume, lower, upper)
+    # As many sums as the number of faces asks for, whatever the number of threads: same bits
+    ranges = even_ranges(len(faces), min(MOST_SUMS, 1 + len(faces) // FACES_PER_SUM // c))
+    n_faces = np.zeros((len(ranges), c), dtype=np.int64)
+    area, volume = np.zeros((2, len(ranges), c))
+    lower, upper = (np.full((len(ranges), c, 3), far) for far in (np.inf, -np.inf))
+
+    def measure(p: int) -> None:
+        sums = n_faces[p], area[p], volume[p], lower[p], upper[p]
+        measure_components(points, faces, *ranges[p], labels, center, *sums)
+
+    run_pieces(measure, len(ranges))
+    n_faces, area, volume = n_faces.sum(axis=0), area.sum(axis=0), volume.sum(axis=0)
+    lower, upper = lower.min(axis=0), upper.max(axis=0)
     closed, oriented = _closed_and_oriented(labels, c, table, lines)
     negative = closed & oriented & (volume < 0)
     around = np.flatnonzero(closed & (volume > 0))
@@ -103,6 +134,6 @@ def _closed_and_oriented(
 
 
 def _component_of_edge(labels: FaceLabels, table: EdgeTable) -> Int32[np.ndarray, " k"]:
-    component = np.empty(len(table.edges) + 1, dtype=np.int32)
+    component = np.empty(table.n_edges + 1, dtype=np.int32)
     component[table.edge_of_corner] = labels[:, None]
     return component[:-1]

@@ -196,7 +196,7 @@ def residual_edge_lines(
     if table.is_balanced:
         return np.empty((0, 3), dtype=np.int32), np.empty((0, 2), dtype=np.int32)
     lines = residual_lines(table, points)
-    line_of_edge = np.full(len(table.edges) + 1, -1, dtype=np.int32)  # the last is for corner -1
+    line_of_edge = np.full(table.n_edges + 1, -1, dtype=np.int32)  # the last is for corner -1
     line_of_edge[lines.edge_index] = lines.line
     x, y, z = points[lines.junction_vertex].T
     order = np.lexsort((z, y, x, lines.junction_line))

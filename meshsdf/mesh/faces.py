@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int32
 
-from ..arrays import FaceMask, Faces, Points
+from ..arrays import FaceMask, Faces, Points, writable_alias
 from ..kernels.weld import sort_corners
 from .collinear import are_collinear
 from .weld import number_equal_rows
@@ -42,7 +42,7 @@ def face_sheets(faces: Faces) -> FaceSheets:
     """Find the faces with equal corners; ``faces`` name welded vertices."""
     rows = np.empty((len(faces), 3), dtype=np.uint64)
     is_even = np.empty(len(faces), dtype=np.bool_)
-    sort_corners(np.array(faces), rows, is_even)
+    sort_corners(writable_alias(faces), rows, is_even)
     sheet, first = number_equal_rows(rows)
     n_copies = np.bincount(sheet, minlength=len(first)).astype(np.int32)
     n_even = np.bincount(sheet[is_even], minlength=len(first)).astype(np.int32)
@@ -55,7 +55,7 @@ def degenerate_faces(points: Points, faces: Faces) -> FaceMask:
     They separate nothing and no distance is measured to them, yet they stay in the chain of edges
     that `check` examines: removing a sliver that fills a T-junction would open the index mesh.
     """
-    return are_collinear(np.array(points), np.array(faces))
+    return are_collinear(writable_alias(points), writable_alias(faces))
 
 
 def odd_faces(faces: Faces) -> FaceMask:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..arrays import FaceValues
-from ..kernels.edges import connect_faces
+from .components import component_labels
 from .edge_table import EdgeTable, edge_table
 from .mesh import Mesh
 from .pieces import connected_labels
@@ -68,14 +68,12 @@ def euler_number(mesh: Mesh) -> int:
     """
     used = np.zeros(mesh.n_vertices, bool)
     used[mesh.faces] = True
-    return int(used.sum()) - len(_edges(mesh).edges) + mesh.n_faces
+    return int(used.sum()) - _edges(mesh).n_edges + mesh.n_faces
 
 
 def n_components(mesh: Mesh) -> int:
     """Return the number of pieces, where faces that share an edge by index hang together."""
-    table = _edges(mesh)
-    labels = np.empty(mesh.n_faces, np.int32)
-    n_pieces = connect_faces(table.edge_of_corner, len(table.edges), labels)
+    labels, n_pieces = component_labels(_edges(mesh))
     return n_pieces + int((labels < 0).sum())
 
 
@@ -88,8 +86,8 @@ def is_watertight(mesh: Mesh) -> bool:
     vertices and four faces on one edge do not. A mesh without faces is not watertight.
     """
     table = _edges(mesh)
-    has_edges = mesh.n_faces > 0 and bool((table.edge_of_corner >= 0).all())
-    return has_edges and bool((table.n_uses == 2).all()) and table.is_balanced
+    has_edges = 0 < mesh.n_faces == len(table.half_edges) / 3
+    return has_edges and table.n_nonmanifold == 0 and table.is_balanced
 
 
 def n_boundary_loops(mesh: Mesh) -> int:

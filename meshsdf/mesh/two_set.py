@@ -20,7 +20,6 @@ number is the same whole number everywhere on each side (`oriented`).
 import numpy as np
 
 from ..errors import MeshError
-from ..kernels.edges import mark_branching_vertices
 from ..progress import Progress, silent
 from .components import describe_components
 from .crack_repair import CrackRepair, close_cracks
@@ -69,7 +68,6 @@ def check(
     lines = None if table.is_balanced else residual_lines(table, points)
     segments = np.empty((0, 2), dtype=np.int32) if lines is None else lines.survivors(points)
     holes = trace_holes(points, segments)
-    n_odd = int((table.n_uses % 2).sum())
     open_edges = segments if lines is None else lines.open_edges()
     n_open = len(open_edges)
     repair = close_cracks(points, faces, open_edges) if n_open else None
@@ -77,8 +75,8 @@ def check(
     facts = {
         "two_set": len(segments) == 0,
         "oriented": lines is None or lines.is_balanced(),
-        "open_edge_share": n_open / max(1, len(table.edges)),
-        "n_orientation_conflicts": int(((table.n_uses % 2 == 0) & (table.net_uses != 0)).sum()),
+        "open_edge_share": n_open / max(1, table.n_edges),
+        "n_orientation_conflicts": table.n_conflicts,
     }
     sign, reason = _recommend(**facts, repair=repair)
     components = describe_components(points, faces, table, lines)
@@ -89,13 +87,13 @@ def check(
         **facts,
         **_face_facts(points, faces, table),
         two_set_by_index=by_index.is_even,
-        two_set_by_welding=n_odd == 0,
+        two_set_by_welding=table.is_even,
         oriented_by_index=by_index.is_balanced,
         n_vertices=mesh.n_vertices,
         n_welded_vertices=len(points),
         n_faces=mesh.n_faces,
         n_open_edges=len(segments),
-        n_tjunction_edges=n_odd - n_open,
+        n_tjunction_edges=table.n_odd - n_open,
         holes=holes,
         certain_beyond=max((hole.reach for hole in holes), default=0.0),
         repair=repair,
@@ -108,21 +106,24 @@ def check(
 
 def _face_facts(points: np.ndarray, faces: np.ndarray, table: EdgeTable) -> dict:
     """What faces and vertices tell apart from the chain of edges."""
-    sheets = face_sheets(faces)
     degenerate = degenerate_faces(points, faces)
-    is_even_sheet = sheets.n_copies % 2 == 0
-    flat_sheets = sheets.sheet_of_face[degenerate]
-    is_even_sheet[flat_sheets] = False
-    is_branching = np.zeros(len(points), dtype=np.bool_)
-    n_fans = np.zeros(len(points), dtype=np.int32)
-    mark_branching_vertices(faces, table.edge_of_corner, table.n_uses, n_fans, is_branching)
-    return {
-        "strict": not is_even_sheet.any(),
+    facts = {
+        "strict": True,
         "n_degenerate_faces": int(degenerate.sum()),
+        "n_duplicate_faces": 0,
+        "n_opposed_duplicates": 0,
+        "n_nonmanifold_edges": table.n_nonmanifold,
+        "n_nonmanifold_vertices": int(table.is_branching.sum()),
+    }
+    if len(table.half_edges) == faces.size and not table.may_have_twins:
+        return facts
+    sheets = face_sheets(faces)
+    is_even_sheet = sheets.n_copies % 2 == 0
+    is_even_sheet[sheets.sheet_of_face[degenerate]] = False
+    return facts | {
+        "strict": not is_even_sheet.any(),
         "n_duplicate_faces": int((sheets.n_copies - 1).sum()),
         "n_opposed_duplicates": int((sheets.n_copies - np.abs(sheets.net_copies)).sum() // 2),
-        "n_nonmanifold_edges": int((table.n_uses > 2).sum()),
-        "n_nonmanifold_vertices": int(is_branching.sum()),
     }
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Faces, Points
+from ..arrays import Faces, Points, writable_alias
 from .edge_table import EdgeTable, edge_table
 from .weld import weld
 
@@ -31,5 +31,8 @@ class Welded:
 def weld_mesh(vertices: Points, faces: Faces) -> Welded:
     """Join equal positions and list the edges. O(n + m)."""
     labels, points = weld(vertices)
-    joined = labels[faces] if len(faces) else np.empty((0, 3), np.int32)
+    if len(points) == len(vertices):
+        joined = writable_alias(faces)
+    else:
+        joined = labels[faces] if len(faces) else np.empty((0, 3), np.int32)
     return Welded(points, joined, edge_table(joined, len(points)))

@@ -20,7 +20,7 @@ from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from ..progress import Progress
 from .lattice import Lattice
 from .memory import MARKED_PER_KEPT, SLABS_PER_THREAD, band_bytes, require_memory
-from .placed_mesh import PlacedMesh
+from .placed_mesh import Features, PlacedMesh
 from .slabs import bin_features, items_of
 
 
@@ -40,6 +40,7 @@ class BandBuilder:
     closest: bool
     max_memory: Number | None
     progress: Progress
+    features: Features = field(init=False)
     root: np.ndarray = field(init=False)
     pages: np.ndarray = field(init=False)
 
@@ -75,15 +76,15 @@ class BandBuilder:
 
     def _cut_slabs(self) -> None:
         """Slabs of brick columns, and which faces, edges and vertices reach into each."""
-        points, faces, features = self.placed.points, self.placed.faces, self.placed.features
+        points, faces = self.placed.points, self.placed.faces
+        self.features = features = self.placed.features(self.half_width)
         low = max(0, int((points[:, 0].min() - self.half_width) // 8))
         high = int((points[:, 0].max() + self.half_width) // 8) + 1
         ranges = even_ranges(high - low, SLABS_PER_THREAD * n_threads())
         self.slabs = [(low + a, low + b) for a, b in ranges]
         edges = np.array([8.0 * low] + [8.0 * b for _, b in self.slabs])
-        used = np.flatnonzero(np.diff(features.start)).astype(np.int32)
         reach = self.half_width + 1e-3
-        kinds = [features.ends, faces, used[:, None]]
+        kinds = [features.ends, faces, features.corners[:, None]]
         if self.closed is not self.placed:
             kinds.append(self.closed.faces)
         lists = [None] * len(kinds)
@@ -93,7 +94,7 @@ class BandBuilder:
 
         run_pieces(bin_kind, len(kinds))
         self.edges_of, self.faces_of, (start, items) = lists[:3]
-        self.vertices_of = start, used[items]
+        self.vertices_of = start, features.corners[items]
         self.closed_faces_of = lists[-1] if self.closed is not self.placed else self.faces_of
 
     def _mark_slab(self, s: int) -> None:
@@ -181,7 +182,7 @@ class BandBuilder:
         nearest = np.full((b - a if self.closest else 0, 512), len(self.placed.faces), np.int32)
         first, last = self.slabs[s]
         window = (self.half_width, 8 * first, 8 * last, self.root, self.pages, a, squared, nearest)
-        points, faces, f = self.placed.points, self.placed.faces, self.placed.features
+        points, faces, f = self.placed.points, self.placed.faces, self.features
         scan_faces(points, faces, items_of(self.faces_of, s), *window)
         edges, vertices = items_of(self.edges_of, s), items_of(self.vertices_of, s)
         scan_edges(points, faces, f.ends, f.first, f.order, edges, *window)

@@ -6,14 +6,14 @@ faces in even number for parity, faces that come with their reverse for winding 
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Int32
 
 from ..arrays import FaceLabels, FaceMask, Faces, Points
 from ..errors import SdfError
-from ..kernels.vertex_edges import edges_of_vertices
+from ..kernels.folds import edges_of_vertices, ends_of_edges, mark_corners, mark_folds
+from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from ..mesh import (
     TwoSetReport,
     degenerate_faces,
@@ -25,19 +25,23 @@ from ..mesh.edge_table import EdgeTable, edge_table
 from ..mesh.welded import Welded
 from .lattice import Lattice
 
+EDGES_PER_PIECE = 2**15  # at least: less work than that is not worth a thread
+
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Edges with their half-edges, and vertices with their edges.
+    """The edges and vertices that may be closest to a node: folds and corners.
 
     Attributes
     ----------
     ends : (e, 2) int32
-        Vertices of each edge.
+        Vertices of each fold.
     order, first : (h,), (e + 1,) int32
-        Edge e has the half-edges ``3 f + corner`` in ``order[first[e]:first[e + 1]]``.
+        Fold e has the half-edges ``3 f + corner`` in ``order[first[e]:first[e + 1]]``.
     edges, start : (2 e,), (u + 1,) int32
-        Vertex v touches the edges in ``edges[start[v]:start[v + 1]]``.
+        Vertex v touches the folds in ``edges[start[v]:start[v + 1]]``.
+    corners : (c,) int32
+        Vertices with folds that do not just run straight through.
     """
 
     ends: Int32[np.ndarray, "e 2"]
@@ -45,6 +49,7 @@ class Features:
     first: Int32[np.ndarray, " f"]
     edges: Int32[np.ndarray, " t"]
     start: Int32[np.ndarray, " s"]
+    corners: Int32[np.ndarray, " c"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,16 +79,30 @@ class PlacedMesh:
     edge_line: Int32[np.ndarray, "l 3"]
     line_ends: Int32[np.ndarray, "g 2"]
 
-    @cached_property
-    def features(self) -> Features:
-        """Edges and vertices of the faces."""
-        table = self.table
-        first = np.zeros(len(table.edges) + 1, np.int32)
-        np.cumsum(table.n_uses, out=first[1:])
-        start = np.empty(len(self.points) + 1, np.int32)
-        edges = np.empty(2 * len(table.edges), np.int32)
-        edges_of_vertices(table.edges, len(self.points), start, edges)
-        return Features(table.edges, table.half_edges, first, edges, start)
+    def features(self, reach: float) -> Features:
+        """Find the edges and vertices that may be closest to a node within ``reach`` voxels."""
+        points, faces, table = self.points, self.faces, self.table
+        order, first = table.half_edges, table.first
+        is_fold = np.empty(table.n_edges, np.bool_)
+        ranges = even_ranges(table.n_edges, min(n_threads(), 1 + table.n_edges // EDGES_PER_PIECE))
+        run_pieces(
+            lambda p: mark_folds(points, faces, order, first, *ranges[p], reach, is_fold),
+            len(ranges),
+        )
+        folds = np.flatnonzero(is_fold).astype(np.int32)
+        ends = np.empty((len(folds), 2), np.int32)
+        ends_of_edges(faces, order, first, folds, ends)
+        if len(folds) < table.n_edges:
+            n_uses = np.diff(first)
+            order = order[np.repeat(is_fold, n_uses)]
+            first = np.concatenate([[0], np.cumsum(n_uses[folds])]).astype(np.int32)
+        start = np.empty(len(points) + 1, np.int32)
+        edges = np.empty(2 * len(folds), np.int32)
+        edges_of_vertices(ends, len(points), start, edges)
+        is_corner = np.empty(len(points), np.bool_)
+        mark_corners(points, ends, start, edges, reach, is_corner)
+        corners = np.flatnonzero(is_corner).astype(np.int32)
+        return Features(ends, order, first, edges, start, corners)
 
 
 def bounding_faces(welded: Welded, *, cancel: str, report: TwoSetReport | None = None) -> FaceMask:

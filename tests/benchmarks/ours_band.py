@@ -5,11 +5,11 @@ and distance, after a first small run that loads the kernels.
 """
 
 import json
-import resource
 import sys
 import time
 
 import numpy as np
+from peak import peak_bytes
 
 from meshsdf import Mesh, mesh_to_band
 
@@ -21,8 +21,7 @@ def main(path, resolution):
     begin = time.perf_counter()
     band = mesh_to_band(Mesh(points, faces), resolution=float(resolution))
     seconds = time.perf_counter() - begin
-    peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    print(json.dumps({"seconds": seconds, "n_active": band.n_active, "peak": peak}))
+    print(json.dumps({"seconds": seconds, "n_active": band.n_active, "peak": peak_bytes()}))
 
 
 main(*sys.argv[1:])

@@ -4,12 +4,12 @@ Usage: rival_openvdb.py MESH.obj|MESH.npz OUT.vdb|- RESOLUTION; prints one JSON 
 """
 
 import json
-import resource
 import sys
 import time
 
 import numpy as np
 import pyopenvdb as vdb
+from peak import peak_bytes
 
 
 def read_obj(path):
@@ -42,8 +42,9 @@ def main(mesh, out, resolution):
     seconds = time.perf_counter() - begin
     if out != "-":
         vdb.write(out, grids=[grid])
-    peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    print(json.dumps({"seconds": seconds, "n_active": grid.activeVoxelCount(), "peak": peak}))
+    print(
+        json.dumps({"seconds": seconds, "n_active": grid.activeVoxelCount(), "peak": peak_bytes()})
+    )
 
 
 main(*sys.argv[1:])
