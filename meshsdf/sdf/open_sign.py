@@ -21,6 +21,8 @@ from .lattice_winding import LatticeWinding
 from .memory import BYTES_PER_BRICK, require_memory
 from .placed_mesh import PlacedMesh
 
+BRICKS_AT_ONCE = 4096  # bounds the memory of intermediate results
+
 # To the neighbours through the faces -x, +x, -y, +y, -z, +z
 STEPS = np.repeat(np.eye(3, dtype=np.int64), 2, axis=0) * np.tile([[-1], [1]], (3, 1))
 
@@ -57,8 +59,23 @@ def sign_by_winding_number(
         n_uncertain += n_more
         last = fresh
         bricks, inside = _merge(bricks, inside, fresh, more)
-    bricks, inside = _merge(band.index.coordinates, own, bricks, inside)
-    return _signed(band, bricks, _inner_bricks(winding, bricks), inside, n_uncertain)
+    _negate(band.values, own)
+    del own
+    everything = np.concatenate([band.index.coordinates, bricks])
+    everything = everything[np.lexsort(everything.T[::-1])]
+    band = _with_bricks(band, everything, _inner_bricks(winding, everything), bricks, inside)
+    return replace(band, sign="winding", uncertain_voxels=n_uncertain)
+
+
+def _negate(values: np.ndarray, inside: np.ndarray) -> None:
+    """Make values negative where ``inside``, in place."""
+    for first in range(0, len(values), BRICKS_AT_ONCE):
+        some, within = (
+            values[first : first + BRICKS_AT_ONCE],
+            inside[first : first + BRICKS_AT_ONCE],
+        )
+        np.negative(some, out=some, where=within)
+        some[within & (some == 0)] = NEGATIVE_ZERO
 
 
 def _merge(
@@ -113,16 +130,16 @@ def _inner_bricks(winding: LatticeWinding, coordinates: np.ndarray) -> np.ndarra
     return np.argwhere(np.isin(regions, inner)) + low
 
 
-def _signed(
+def _with_bricks(
     band: NarrowBand,
     coordinates: np.ndarray,
     inner: np.ndarray,
+    more: np.ndarray,
     inside: np.ndarray,
-    n_uncertain: int,
 ) -> NarrowBand:
-    """The band on a larger index; new bricks are empty but for their sign."""
+    """The band on a larger index; the bricks ``more`` are empty but for their sign."""
     index = band.index
-    if len(coordinates) > index.n_bricks or len(inner):
+    if len(more) or len(inner):
         index = BrickIndex.from_coordinates(coordinates, inner)
     old = index.lookup(band.index.coordinates)
 
@@ -134,15 +151,12 @@ def _signed(
         return wide
 
     values = spread(band.values, band.background)
-    np.negative(values, out=values, where=inside)
-    values[inside & (values == 0)] = NEGATIVE_ZERO
+    values[index.lookup(more)] = np.where(inside, -band.background, band.background)
     return replace(
         band,
         index=index,
         values=values,
         active=spread(band.active, 0),
-        sign="winding",
         closest_face=spread(band.closest_face, -1),
         barycentric=spread(band.barycentric, 0.0),
-        uncertain_voxels=n_uncertain,
     )
