@@ -6,6 +6,7 @@ It maps one to one to a VDB level set: a brick is a leaf, its mask the leaf's ac
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool
 
 from ..arrays import (
     BrickBarycentrics,
@@ -50,10 +51,11 @@ class NarrowBand:
         Face of the mesh with the closest point; -1 at nodes that are not active.
     barycentric : (b, 8, 8, 8, 2) float32 or None
         Weights of the face's second and third corner at the closest point.
-    uncertain_voxels : int or None
-        Of an open mesh: at how many nodes the winding number is within 0.05 of 1/2, so that the
-        side depends on how one thinks of the openings as filled. Of a mesh whose cracks were
-        zipped: how many nodes lie so near the surface that their side is not proved.
+    uncertain : (b, 8) uint64 or None
+        Bits, as in ``active``, of nodes whose side is not certain; None where all are. Of an open
+        mesh: the winding number is within 0.05 of 1/2, so that the side depends on how one thinks
+        of the openings as filled. Of a mesh whose cracks were zipped: the node lies so near the
+        surface that its side is not proved.
     """
 
     index: BrickIndex
@@ -65,11 +67,11 @@ class NarrowBand:
     sign: str
     closest_face: BrickFaces | None = None
     barycentric: BrickBarycentrics | None = None
-    uncertain_voxels: int | None = None
+    uncertain: BrickMasks | None = None
 
     def __post_init__(self) -> None:
         n = self.index.n_bricks
-        for name in ("values", "active", "closest_face", "barycentric"):
+        for name in ("values", "active", "closest_face", "barycentric", "uncertain"):
             array = getattr(self, name)
             if array is not None and len(array) != n:
                 raise GridError(
@@ -92,6 +94,17 @@ class NarrowBand:
     def n_active(self) -> int:
         """Number of active nodes."""
         return int(np.bitwise_count(self.active).sum())
+
+    @property
+    def uncertain_voxels(self) -> int | None:
+        """At how many nodes the side is not certain; None where it is at all of them."""
+        return None if self.uncertain is None else int(np.bitwise_count(self.uncertain).sum())
+
+    def uncertain_ijk(self) -> Ijk:
+        """Return the (n, 3) int64 index coordinates of the nodes whose side is not certain."""
+        if self.uncertain is None:
+            return np.empty((0, 3), np.int64)
+        return _nodes_of(self.uncertain, self.index)
 
     def active_box(self) -> tuple[Ijk1, Ijk1]:
         """Return the lowest and highest index coordinates of active nodes.
@@ -121,13 +134,11 @@ class NarrowBand:
 
     def active_mask(self) -> np.ndarray:
         """Return the (b, 8, 8, 8) bool mask of active nodes."""
-        bits = np.unpackbits(self.active.astype("<u8").view(np.uint8), bitorder="little")
-        return bits.view(bool).reshape(-1, BRICK, BRICK, BRICK)
+        return node_mask(self.active)
 
     def active_ijk(self) -> Ijk:
         """Return the (n, 3) int64 index coordinates of the active nodes, brick by brick."""
-        slot, i, j, k = np.nonzero(self.active_mask())
-        return self.index.coordinates[slot] * BRICK + np.stack([i, j, k], axis=1)
+        return _nodes_of(self.active, self.index)
 
     def active_values(self) -> Values:
         """Return the (n,) values of the active nodes, in the order of `active_ijk`."""
@@ -163,3 +174,21 @@ class NarrowBand:
         out = np.empty(len(ijk))
         read_nodes(self.index.root, self.index.pages, self.values, self.background, local, out)
         return out
+
+
+def node_mask(words: BrickMasks) -> Bool[np.ndarray, "b 8 8 8"]:
+    """Return what (b, 8) words say of every node: bit ``8 j + k`` of word i is node (i, j, k)."""
+    bits = np.unpackbits(words.astype("<u8").view(np.uint8), bitorder="little")
+    return bits.view(bool).reshape(-1, BRICK, BRICK, BRICK)
+
+
+def node_words(mask: Bool[np.ndarray, "b ..."]) -> BrickMasks:
+    """Return the (b, 8) words of a mask of the 512 nodes of every brick; see `node_mask`."""
+    packed = np.packbits(mask.reshape(len(mask), BRICK, BRICK**2), axis=2, bitorder="little")
+    return packed.view("<u8").astype(np.uint64)[:, :, 0]
+
+
+def _nodes_of(words: BrickMasks, index: BrickIndex) -> Ijk:
+    """Index coordinates of the nodes whose bits are set, brick by brick."""
+    slot, i, j, k = np.nonzero(node_mask(words))
+    return index.coordinates[slot] * BRICK + np.stack([i, j, k], axis=1)

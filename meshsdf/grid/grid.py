@@ -23,6 +23,9 @@ class Grid:
         World position of node (0, 0, 0).
     sign : str
         How inside was told: "parity", "winding" or "unsigned".
+    uncertain_voxels : int or None
+        At how many nodes near the surface the side is not certain, as `NarrowBand.uncertain` says;
+        None where it is at all of them.
 
     Raises
     ------
@@ -34,6 +37,7 @@ class Grid:
     voxel_size: float
     origin: Vector3
     sign: str = "parity"
+    uncertain_voxels: int | None = None
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.voxel_size) and self.voxel_size > 0):
@@ -48,7 +52,7 @@ class Grid:
 
     def facts(self) -> dict:
         """Return what scripts ask for: kind, voxel_size, shape, active_voxels, …"""
-        return {
+        facts = {
             "kind": "grid",
             "voxel_size": self.voxel_size,
             "origin": self.origin.tolist(),
@@ -57,3 +61,6 @@ class Grid:
             "n_bricks": None,
             "sign": self.sign,
         }
+        if self.uncertain_voxels is not None:
+            facts["uncertain_voxels"] = self.uncertain_voxels
+        return facts

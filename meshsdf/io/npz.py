@@ -16,12 +16,14 @@ Narrow band, b bricks of 8 x 8 x 8 nodes:
 - ``active`` (b, 8) uint64: bit ``8 j + k`` of word i tells whether node (i, j, k) is in the band
 - ``page_origin`` (3,) int64, ``root`` (px, py, pz) int32, ``pages`` (p, 16, 16, 16) int32: the
   page table; an entry is a page or slot (>= 0), -1 outside, -2 inside
+- ``uncertain`` (b, 8) uint64: bits of nodes whose side is not certain, if there are such
 - ``closest_face`` (b, 8, 8, 8) int32 and ``barycentric`` (b, 8, 8, 8, 2) float32: if known
 
 Grid:
 
 - ``values`` (ni, nj, nk) float32 or float64, or float16; NaN where there are no data
 - ``origin`` (3,) float64: world position of node (0, 0, 0)
+- ``uncertain_voxels`` int64: at how many nodes near the surface the side is not certain, if any
 """
 
 import os
@@ -53,6 +55,7 @@ _BAND_KEYS = {
     "pages": (("<i4",), (None, 16, 16, 16)),
     "values": (_FLOATS, (_B, 8, 8, 8)),
     "active": (("<u8",), (_B, 8)),
+    "uncertain": (("<u8",), (_B, 8)),
     "closest_face": (("<i4",), (_B, 8, 8, 8)),
     "barycentric": (("<f4",), (_B, 8, 8, 8, 2)),
 }
@@ -62,8 +65,9 @@ _GRID_KEYS = {
     "origin": (("<f8",), (3,)),
     "sign": ("text", ()),
     "values": ((*_FLOATS, "<f8"), (None, None, None)),
+    "uncertain_voxels": (("<i8",), ()),
 }
-_OPTIONAL = {"closest_face", "barycentric"}
+_OPTIONAL = {"closest_face", "barycentric", "uncertain", "uncertain_voxels"}
 _LARGEST_HALF = 65504.0
 _SMALLEST_HALF = 2.0**-14  # below this a float16 loses bits
 
@@ -178,20 +182,23 @@ def _band_arrays(band: NarrowBand) -> dict[str, np.ndarray]:
         "values": band.values,
         "active": band.active,
     }
-    for name in ("closest_face", "barycentric"):
+    for name in ("closest_face", "barycentric", "uncertain"):
         if getattr(band, name) is not None:
             arrays[name] = getattr(band, name)
     return arrays
 
 
 def _grid_arrays(grid: Grid) -> dict[str, np.ndarray]:
-    return {
+    arrays = {
         "format": np.array(GRID),
         "voxel_size": np.array(grid.voxel_size, np.float64),
         "origin": grid.origin,
         "sign": np.array(grid.sign),
         "values": grid.values,
     }
+    if grid.uncertain_voxels is not None:
+        arrays["uncertain_voxels"] = np.array(grid.uncertain_voxels, np.int64)
+    return arrays
 
 
 def _band(arrays: dict[str, np.ndarray]) -> NarrowBand:
@@ -206,6 +213,7 @@ def _band(arrays: dict[str, np.ndarray]) -> NarrowBand:
         str(arrays["sign"]),
         arrays.get("closest_face"),
         arrays.get("barycentric"),
+        arrays.get("uncertain"),
     )
 
 
@@ -213,7 +221,14 @@ def _grid(arrays: dict[str, np.ndarray]) -> Grid:
     values = arrays["values"]
     if values.dtype == np.float16:
         values = values.astype(np.float32)
-    return Grid(values, float(arrays["voxel_size"]), arrays["origin"], str(arrays["sign"]))
+    doubts = arrays.get("uncertain_voxels")
+    return Grid(
+        values,
+        float(arrays["voxel_size"]),
+        arrays["origin"],
+        str(arrays["sign"]),
+        None if doubts is None else int(doubts),
+    )
 
 
 def _kind(archive: ArchiveReader) -> str:

@@ -21,6 +21,7 @@ HALF = 0.5 + 1e-9
 # half diagonal; over half a side that is 2 / sqrt(3) of the bound for points and centre
 ALONG_LINE = 1.16
 QUICK = 0.3, 0.05  # change up to which a block is tried as a whole; that of one tree node
+ONE = np.uint64(1)
 SMALL = 2e-4  # change of W below which a tree node is not looked into, for the linear model
 BENT = (0.06, 0.15, 0.25)  # change beyond the linear model for which 8^3, 4^3, 2^3 are cut
 
@@ -86,8 +87,8 @@ def _settle_evenly(counts, first, side, value, error, membrane, inside):
 
 
 @njit(cache=True, nogil=True)
-def _settle_block(boundary, corner, first, side, counts, membrane, inside):
-    """Decide a block of side^3 nodes; return how many are uncertain, -1 if it must be cut."""
+def _settle_block(boundary, corner, first, side, counts, membrane, inside, uncertain):
+    """Decide a block of side^3 nodes, unless it must be cut first: then return False."""
     half = 0.5 * (side - 1)
     x, y = float(corner[0] + first[0]), float(corner[1] + first[1])
     z = float(corner[2] + first[2]) + half
@@ -100,7 +101,7 @@ def _settle_block(boundary, corner, first, side, counts, membrane, inside):
         if is_quick and (is_cut or bent + linear >= 0.5 - membrane):
             continue
         if bent == np.inf:
-            return -1
+            return False
         if is_cut:
             bent *= ALONG_LINE
             continue
@@ -108,8 +109,7 @@ def _settle_block(boundary, corner, first, side, counts, membrane, inside):
             value, error = boundary_term(boundary, center, COARSE)
         spread = bent + linear + error
         if _settle_evenly(counts, first, side, value, spread, membrane, inside):
-            return 0
-    uncertain = 0
+            return True
     for i in range(side):
         for j in range(side):
             at = value + slope[0] * (i - half) + slope[1] * (j - half)
@@ -122,21 +122,23 @@ def _settle_block(boundary, corner, first, side, counts, membrane, inside):
                     p = (x + i, y + j, z + (k - half))
                     wound = _winding(boundary, p, counts[node], membrane)
                 inside[node] = abs(wound) > HALF
-                uncertain += abs(abs(wound) - HALF) < membrane
-    return uncertain
+                if abs(abs(wound) - HALF) < membrane:
+                    uncertain[node >> 6] |= ONE << np.uint64(node & 63)
+    return True
 
 
 @njit(cache=True, nogil=True)
-def wind_bricks(boundary, coordinates, counts, membrane, only_whole, inside, uncertain):
-    """Fill ``inside`` (b, 512) bool; ``uncertain[b]`` counts nodes with ||W| - 1/2| < membrane.
+def wind_bricks(boundary, coordinates, counts, membrane, only_whole, inside, uncertain, is_hard):
+    """Fill ``inside`` (b, 512) bool; set bits of nodes with ||W| - 1/2| < membrane.
 
-    ``coordinates`` (b, 3) int64 are local bricks, ``counts`` (b, 512) int32 their N. With
-    ``only_whole``, ``uncertain`` is -1 for bricks that cannot be decided at once.
+    ``coordinates`` (b, 3) int64 are local bricks, ``counts`` (b, 512) int32 their N,
+    ``uncertain`` (b, 8) uint64 the bits, of zeros. ``is_hard`` (b,) bool: with ``only_whole``,
+    bricks that cannot be decided at once, and are not.
     """
     cubes = np.empty((32, 4), np.int64)  # first node and side of cubes: 1 + 3 levels of 7 more
     for b in range(len(coordinates)):
         corner = (8 * coordinates[b, 0], 8 * coordinates[b, 1], 8 * coordinates[b, 2])
-        uncertain[b] = 0
+        is_hard[b] = False
         cubes[0] = 0
         cubes[0, 3] = 8
         n_left = 1
@@ -152,14 +154,14 @@ def wind_bricks(boundary, coordinates, counts, membrane, only_whole, inside, unc
                 p = (float(x), float(y), float(z))
                 wound = abs(_winding(boundary, p, counts[b, node], membrane))
                 inside[b, node] = wound > HALF
-                uncertain[b] += abs(wound - HALF) < membrane
+                if abs(wound - HALF) < membrane:
+                    uncertain[b, node >> 6] |= ONE << np.uint64(node & 63)
                 continue
-            n = _settle_block(boundary, corner, first, side, counts[b], membrane, inside[b])
-            if n >= 0:
-                uncertain[b] += n
+            states = inside[b], uncertain[b]
+            if _settle_block(boundary, corner, first, side, counts[b], membrane, *states):
                 continue
             if only_whole:
-                uncertain[b] = -1
+                is_hard[b] = True
                 break
             side //= 2
             for part in range(8):

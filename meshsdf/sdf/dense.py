@@ -61,7 +61,8 @@ def mesh_to_grid(
     )
     query = ClosestPoint(_bounding_mesh(mesh, band, report))
     values = fill_grid(band, query, first, shape, progress)
-    return Grid(values, band.voxel_size, band.to_world(first[None])[0], band.sign)
+    origin = band.to_world(first[None])[0]
+    return Grid(values, band.voxel_size, origin, band.sign, band.uncertain_voxels)
 
 
 def _bounding_mesh(mesh: Mesh, band: NarrowBand, report: TwoSetReport) -> Mesh:

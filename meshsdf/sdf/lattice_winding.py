@@ -16,6 +16,7 @@ import numpy as np
 
 from ..arrays import Values
 from ..grid import BrickIndex
+from ..grid.brick_grid import node_words
 from ..grid.brick_index import BRICK
 from ..kernels.crossings import count_crossings
 from ..kernels.open_signs import HALF, sum_upwards, wind_bricks, wind_points
@@ -40,7 +41,7 @@ OFFSETS = np.indices((BRICK, BRICK, BRICK)).reshape(3, -1).T
 
 @dataclass(frozen=True, eq=False)
 class _States:
-    """Which nodes are inside, how many of each brick are uncertain, and what is left to do."""
+    """Which nodes are inside, which uncertain (bits), and which bricks are left to do."""
 
     inside: np.ndarray
     uncertain: np.ndarray
@@ -48,7 +49,7 @@ class _States:
 
     @classmethod
     def empty(cls, n: int) -> "_States":
-        return cls(np.empty((n, BRICK**3), np.bool_), np.empty(n, np.int64), [])
+        return cls(np.empty((n, BRICK**3), np.bool_), np.zeros((n, BRICK), np.uint64), [])
 
 
 class LatticeWinding:
@@ -69,7 +70,7 @@ class LatticeWinding:
         self.local = index.coordinates - index.origin
         self.top = np.zeros((index.n_bricks, BRICK * BRICK), np.int32)
 
-    def first_sides(self, progress: Progress = silent) -> tuple[np.ndarray, int]:
+    def first_sides(self, progress: Progress = silent) -> tuple[np.ndarray, np.ndarray]:
         """Return `sides` of the index's own bricks; to be called before any other."""
         x = self.local[:, 0]
         ranges = even_ranges(int(x[-1] - x[0]) + 1, SLABS_PER_THREAD * n_threads())
@@ -87,15 +88,17 @@ class LatticeWinding:
         run_pieces(wind_slab, len(slabs), stage="sign", progress=progress)
         return self._settle_rest(self.local, states, progress)
 
-    def sides(self, bricks: np.ndarray, progress: Progress = silent) -> tuple[np.ndarray, int]:
+    def sides(
+        self, bricks: np.ndarray, progress: Progress = silent
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Tell which nodes of bricks missing in the index lie inside.
 
         Returns
         -------
         inside : (b, 8, 8, 8) bool
             The winding number exceeds 1/2 in magnitude.
-        n_uncertain : int
-            At how many nodes it does so, or does not, by less than `MEMBRANE`.
+        uncertain : (b, 8) uint64
+            Bits of the nodes at which it does so, or does not, by less than `MEMBRANE`.
         """
         local = np.ascontiguousarray(bricks - self.index.origin)
         states = _States.empty(len(local))
@@ -132,14 +135,14 @@ class LatticeWinding:
     ) -> None:
         """Decide bricks a ... b - 1, all or, in a soup, those that are easy."""
         many = len(self.boundary.chain) > MANY_EDGES
-        inside, uncertain = states.inside[a:b], states.uncertain[a:b]
-        wind_bricks(self.boundary.arrays, local[a:b], counts, MEMBRANE, many, inside, uncertain)
-        hard = np.flatnonzero(uncertain < 0)
+        found = states.inside[a:b], states.uncertain[a:b], np.empty(b - a, np.bool_)
+        wind_bricks(self.boundary.arrays, local[a:b], counts, MEMBRANE, many, *found)
+        hard = np.flatnonzero(found[2])
         states.hard.append((a + hard, counts[hard]))
 
     def _settle_rest(
         self, local: np.ndarray, states: "_States", progress: Progress
-    ) -> tuple[np.ndarray, int]:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Decide what `_wind` has left, and put the states into shape."""
         hard = np.concatenate([bricks for bricks, _ in states.hard])
         counts = np.concatenate([counts for _, counts in states.hard])
@@ -150,10 +153,10 @@ class LatticeWinding:
             bricks = hard[some]
             wound = self._approximate(local[bricks], counts[some])
             states.inside[bricks] = wound > HALF
-            states.uncertain[bricks] = (np.abs(wound - HALF) < MEMBRANE).sum(axis=1)
+            states.uncertain[bricks] = node_words(np.abs(wound - HALF) < MEMBRANE)
             progress("sign", min(1.0, (first + BRICKS_AT_ONCE) / len(hard)))
         shaped = states.inside.reshape(-1, BRICK, BRICK, BRICK)
-        return shaped, int(states.uncertain.sum())
+        return shaped, states.uncertain
 
     def _approximate(self, local: np.ndarray, counts: np.ndarray) -> np.ndarray:
         """|W| of (b, 512) nodes: by a tree over faces, exactly where that comes near 1/2."""

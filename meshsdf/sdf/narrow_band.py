@@ -7,6 +7,7 @@ import numpy as np
 from ..arrays import Number, Vector3
 from ..errors import SdfError
 from ..grid import NarrowBand
+from ..grid.brick_grid import node_words
 from ..mesh import Mesh
 from ..mesh.two_set import TwoSetReport, check
 from ..mesh.welded import weld_mesh
@@ -20,6 +21,7 @@ from .sign import SignMethod, choose_sign
 
 MIN_HALF_WIDTH = 1.0
 MAX_HALF_WIDTH = 1000.0
+BRICKS_AT_ONCE = 4096  # bounds the memory of intermediate results
 
 
 def mesh_to_band(
@@ -112,7 +114,7 @@ def mesh_to_band(
         beyond = None if report.repair is None else report.repair.certain_beyond
         if beyond is None:
             return band
-        return replace(band, uncertain_voxels=_count_near(band, beyond))
+        return replace(band, uncertain=_near(band, beyond))
     if choice.method == "unsigned":
         return band
     signed = sign_by_winding_number(band, placed, max_memory=max_memory, progress=progress)
@@ -121,12 +123,13 @@ def mesh_to_band(
     return signed
 
 
-def _count_near(band: NarrowBand, distance: float) -> int:
-    """Active nodes no further than ``distance`` (world units) from the surface."""
-    near = 0
-    for slot in np.flatnonzero(np.abs(band.values).min(axis=(1, 2, 3)) <= distance):
-        near += int((np.abs(band.values[slot]) <= distance).sum())
-    return near
+def _near(band: NarrowBand, distance: float) -> np.ndarray:
+    """Words of the nodes no further than ``distance`` (world units) from the surface."""
+    words = np.zeros(band.active.shape, np.uint64)
+    for first in range(0, len(words), BRICKS_AT_ONCE):
+        some = slice(first, first + BRICKS_AT_ONCE)
+        words[some] = node_words(np.abs(band.values[some]) <= distance)
+    return words
 
 
 def check_half_width(half_width: Number) -> None:

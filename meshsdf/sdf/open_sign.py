@@ -41,11 +41,11 @@ def sign_by_winding_number(
     1/2 are outside. Near more than a thousand boundary edges, nodes whose number is not within
     0.01 of 1/2 by libigl's approximation (its error has no proven bound; 4e-3 is the largest
     seen) are not evaluated exactly. Nodes of one missing region get one sign, that of its first
-    brick. ``uncertain_voxels`` counts the nodes of bricks at which the number is nearer to 1/2
-    than 0.05.
+    brick. ``uncertain`` marks the nodes of bricks at which the number is nearer to 1/2 than 0.05.
     """
     winding = LatticeWinding(placed, band.index)
-    own, n_uncertain = winding.first_sides(progress)
+    own, doubts = winding.first_sides(progress)
+    more_doubts = np.empty((0, doubts.shape[1]), np.uint64)
     bricks, inside = np.empty((0, 3), np.int64), np.empty((0, *own.shape[1:]), np.bool_)
     last = band.index.coordinates
     while True:
@@ -55,16 +55,18 @@ def sign_by_winding_number(
             break
         n = band.index.n_bricks + len(bricks) + len(fresh)
         require_memory(2 * n * BYTES_PER_BRICK, max_memory, where="mesh_to_band(...): openings")
-        more, n_more = winding.sides(fresh, progress)
-        n_uncertain += n_more
+        more, new_doubts = winding.sides(fresh, progress)
         last = fresh
-        bricks, inside = _merge(bricks, inside, fresh, more)
+        bricks, inside, more_doubts = _merge(
+            (bricks, inside, more_doubts), (fresh, more, new_doubts)
+        )
     _negate(band.values, own)
     del own
     everything = np.concatenate([band.index.coordinates, bricks])
     everything = everything[np.lexsort(everything.T[::-1])]
-    band = _with_bricks(band, everything, _inner_bricks(winding, everything), bricks, inside)
-    return replace(band, sign="winding", uncertain_voxels=n_uncertain)
+    inner = _inner_bricks(winding, everything)
+    band = replace(band, sign="winding", uncertain=doubts)
+    return _with_bricks(band, everything, inner, bricks, inside, more_doubts)
 
 
 def _negate(values: np.ndarray, inside: np.ndarray) -> None:
@@ -78,15 +80,11 @@ def _negate(values: np.ndarray, inside: np.ndarray) -> None:
         some[within & (some == 0)] = NEGATIVE_ZERO
 
 
-def _merge(
-    bricks: np.ndarray, inside: np.ndarray, more: np.ndarray, more_inside: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Both sets of bricks, in lexicographic order."""
-    if len(more) == 0:
-        return bricks, inside
-    bricks, inside = np.concatenate([bricks, more]), np.concatenate([inside, more_inside])
-    order = np.lexsort(bricks.T[::-1])
-    return bricks[order], inside[order]
+def _merge(some: tuple[np.ndarray, ...], more: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+    """Both sets of bricks, and what belongs to them, in lexicographic order."""
+    joined = [np.concatenate(pair) for pair in zip(some, more, strict=True)]
+    order = np.lexsort(joined[0].T[::-1])
+    return tuple(array[order] for array in joined)
 
 
 def _slots(bricks: np.ndarray, indices: tuple[BrickIndex, BrickIndex]) -> np.ndarray:
@@ -136,6 +134,7 @@ def _with_bricks(
     inner: np.ndarray,
     more: np.ndarray,
     inside: np.ndarray,
+    doubts: np.ndarray,
 ) -> NarrowBand:
     """The band on a larger index; the bricks ``more`` are empty but for their sign."""
     index = band.index
@@ -151,12 +150,16 @@ def _with_bricks(
         return wide
 
     values = spread(band.values, band.background)
-    values[index.lookup(more)] = np.where(inside, -band.background, band.background)
+    uncertain = spread(band.uncertain, 0)
+    new = index.lookup(more)
+    values[new] = np.where(inside, -band.background, band.background)
+    uncertain[new] = doubts
     return replace(
         band,
         index=index,
         values=values,
         active=spread(band.active, 0),
+        uncertain=uncertain,
         closest_face=spread(band.closest_face, -1),
         barycentric=spread(band.barycentric, 0.0),
     )

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from meshsdf.mesh import Mesh, check
 from meshsdf.mesh.primitives import box_mesh, icosphere
@@ -39,6 +39,7 @@ def test_signs_beyond_the_certificate_are_those_of_the_whole_ball():
     points, values = band.to_world(band.active_ijk()), band.active_values()
     beyond = check(mesh, self_intersections=False).repair.certain_beyond
     assert band.uncertain_voxels == (np.abs(values) <= beyond).sum() > 0
+    assert_array_equal(band.uncertain_ijk(), band.active_ijk()[np.abs(values) <= beyond])
     clear = (np.abs(values) > beyond) & (np.abs(np.linalg.norm(points, axis=1) - 1) > 0.02)
     assert clear.sum() > 1000
     assert ((values < 0) == (np.linalg.norm(points, axis=1) < 1))[clear].all()

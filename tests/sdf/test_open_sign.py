@@ -20,7 +20,7 @@ from meshsdf.kernels.open_signs import sum_upwards, wind_points
 from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere
 from meshsdf.mesh.two_set import check
-from meshsdf.sdf import mesh_to_band
+from meshsdf.sdf import mesh_to_band, mesh_to_grid
 from meshsdf.sdf.lattice import Lattice
 from meshsdf.sdf.lattice_winding import MEMBRANE, LatticeWinding
 from meshsdf.sdf.placed_mesh import place
@@ -231,6 +231,12 @@ def test_uncertain_voxels_are_those_whose_number_lies_near_one_half():
     low = (off < MEMBRANE - 1e-9).sum() - (band.value_at(nodes) == 0).sum()
     assert low <= band.uncertain_voxels <= (off < MEMBRANE + 1e-9).sum() + 4 * 31
     assert band.facts()["uncertain_voxels"] == band.uncertain_voxels > 0
+    listed = {tuple(node) for node in band.uncertain_ijk().tolist()}
+    assert len(listed) == band.uncertain_voxels
+    assert {tuple(node) for node in nodes[off < MEMBRANE - 1e-9].tolist()} - listed <= {
+        tuple(node) for node in nodes[np.abs(band.value_at(nodes)) < 1e-30].tolist()
+    }
+    assert mesh_to_grid(mesh, resolution=30, sign="winding").uncertain_voxels > 0
     closed = mesh_to_band(box_mesh(), resolution=30)
     assert "uncertain_voxels" not in closed.facts()
 
@@ -285,7 +291,7 @@ def test_the_number_of_threads_changes_no_sign(monkeypatch, n_faces):
         monkeypatch.setattr("meshsdf.sdf.lattice_winding.n_threads", lambda n=threads: n)
         there = mesh_to_band(mesh, resolution=24, sign="winding")
         assert_array_equal(here.values, there.values)
-        assert here.uncertain_voxels == there.uncertain_voxels
+        assert_array_equal(here.uncertain, there.uncertain)
 
 
 @pytest.mark.skipif("MESHSDF_MODELS" not in os.environ, reason="MESHSDF_MODELS names no folder")
