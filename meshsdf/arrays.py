@@ -12,6 +12,8 @@ Number = float | int | np.floating | np.integer
 Points = Float64[np.ndarray, "n 3"]
 Values = Float64[np.ndarray, " n"]
 Vector3 = Float64[np.ndarray, "3"]
+Points2 = Float64[np.ndarray, "n 2"]
+Vector2 = Float64[np.ndarray, "2"]
 Matrix4 = Float64[np.ndarray, "4 4"]
 
 Faces = Int32[np.ndarray, "m 3"]
@@ -30,6 +32,7 @@ BrickMasks = UInt64[np.ndarray, "b 8"]
 BrickFaces = Int32[np.ndarray, "b 8 8 8"]
 BrickBarycentrics = Float32[np.ndarray, "b 8 8 8 2"]
 BrickCoordinates = Int64[np.ndarray, "b 3"]
+BrickRuns = Int64[np.ndarray, "r 4"]
 RootTable = Int32[np.ndarray, "px py pz"]
 PageTable = Int32[np.ndarray, "p 16 16 16"]
 

@@ -1,10 +1,11 @@
-"""Which 8^3 bricks exist, and what is known of those that do not: a two-level page table.
+"""Which 8^3 bricks exist, and what is known of those that do not: a page table.
 
 Brick ``(x, y, z)`` covers the nodes ``8 x ... 8 x + 7`` along each axis. Bricks are grouped into
-pages of 16^3; the root table names the page of each group, or says at once that the whole group
-is outside, inside or a constant tile. Memory grows with the bricks that exist, and one structure
-serves distance bands and volume textures. The grouping is that of OpenVDB's lowest internal node
-(16^3 leaves of 8^3 voxels; Museth 2013, doi:10.1145/2487228.2487235).
+lower pages of 16^3, these into upper pages of 16^3 (2048 nodes a side), and the root table names
+the upper pages; each level may say at once that a whole group is outside, inside or a constant
+tile. Memory grows with the bricks that exist, and one structure serves distance bands and volume
+textures. The lower grouping is that of OpenVDB's lowest internal node (16^3 leaves of 8^3 voxels;
+Museth 2013, doi:10.1145/2487228.2487235).
 """
 
 from dataclasses import dataclass
@@ -12,9 +13,17 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import BrickCoordinates, Ijk, Ijk1, Indices, PageTable, RootTable
+from ..arrays import (
+    BrickCoordinates,
+    BrickRuns,
+    Ijk,
+    Ijk1,
+    Indices,
+    PageTable,
+    RootTable,
+)
 from ..errors import GridError
-from ..kernels.brick_lookup import INSIDE, OUTSIDE, find_bricks
+from ..kernels.brick_lookup import INSIDE, OUTSIDE, find_bricks, mark_runs_inside
 
 BRICK = 8
 """Nodes along one side of a brick."""
@@ -34,11 +43,13 @@ class BrickIndex:
     coordinates : (b, 3) int64
         Brick coordinate of every slot, in lexicographic order.
     page_origin : (3,) int64
-        Page coordinate of ``root[0, 0, 0]``; page p covers the bricks ``16 p ... 16 p + 15``.
-    root : (px, py, pz) int32
-        Number of the page, or the code of the whole page.
+        Coordinate of the first lower page; page p covers the bricks ``16 p ... 16 p + 15``.
+    root : (rx, ry, rz) int32
+        Number of the upper page that covers the lower pages ``page_origin + 16 r ... + 15``, or
+        the code of all of them.
     pages : (p, 16, 16, 16) int32
-        Slot or code of every brick of a page.
+        First the upper pages, which hold numbers of lower pages or codes, then the lower pages,
+        which hold slots of bricks or codes.
     """
 
     coordinates: BrickCoordinates
@@ -48,12 +59,13 @@ class BrickIndex:
 
     @classmethod
     def from_coordinates(
-        cls, coordinates: BrickCoordinates, inside: Ijk | None = None
+        cls, coordinates: BrickCoordinates, inside: BrickRuns | None = None
     ) -> "BrickIndex":
         """Index bricks given in lexicographic order.
 
-        Of the others, those listed in ``inside`` are INSIDE, with the whole page where none of
-        its bricks exists; the rest are OUTSIDE.
+        Of the others, the runs ``inside`` (r, 4) are INSIDE: x, y, z0, z1 for the bricks
+        (x, y, z0) ... (x, y, z1 - 1), with the whole page where none of its bricks exists; the
+        rest are OUTSIDE.
 
         Raises
         ------
@@ -66,18 +78,23 @@ class BrickIndex:
             return cls(
                 coordinates, np.zeros(3, np.int64), empty, np.empty((0, 16, 16, 16), np.int32)
             )
-        page = coordinates // PAGE
-        page_origin = page.min(axis=0)
-        local = page - page_origin
-        root = np.full(local.max(axis=0) + 1, OUTSIDE, np.int32)
-        root[tuple(local.T)] = 0
-        named = root == 0
-        root[named] = np.arange(np.count_nonzero(named), dtype=np.int32)
-        pages = np.full((np.count_nonzero(named), PAGE, PAGE, PAGE), OUTSIDE, np.int32)
-        entry = tuple((coordinates % PAGE).T)
-        pages[(root[tuple(local.T)], *entry)] = np.arange(len(coordinates), dtype=np.int32)
+        page_origin = (coordinates // PAGE).min(axis=0)
+        local = coordinates // PAGE - page_origin
+        group = tuple((local // PAGE).T)
+        root = np.full((local // PAGE).max(axis=0) + 1, OUTSIDE, np.int32)
+        root[group] = 0
+        n_upper = number_marked(root, 0)
+        upper = np.full((n_upper, PAGE, PAGE, PAGE), OUTSIDE, np.int32)
+        entry = (root[group], *(local % PAGE).T)
+        upper[entry] = 0
+        n_lower = number_marked(upper, n_upper)
+        lower = np.full((n_lower, PAGE, PAGE, PAGE), OUTSIDE, np.int32)
+        slots = np.arange(len(coordinates), dtype=np.int32)
+        lower[(upper[entry] - n_upper, *(coordinates % PAGE).T)] = slots
+        pages = np.concatenate([upper, lower])
         if inside is not None:
-            _mark_inside(inside - page_origin * PAGE, root, pages)
+            first = np.array([*page_origin[:2], page_origin[2], page_origin[2]]) * PAGE
+            mark_runs_inside(root, pages, inside - first)
         return cls(coordinates, page_origin, root, pages)
 
     @property
@@ -98,14 +115,12 @@ class BrickIndex:
         return found
 
 
-def _mark_inside(local: np.ndarray, root: np.ndarray, pages: np.ndarray) -> None:
-    within = ((local >= 0) & (local < np.array(root.shape) * PAGE)).all(axis=1)
-    local = local[within]
-    page = tuple((local // PAGE).T)
-    missing = root[page] < 0
-    root[tuple((local[missing] // PAGE).T)] = INSIDE
-    local = local[~missing]
-    pages[(root[tuple((local // PAGE).T)], *(local % PAGE).T)] = INSIDE
+def number_marked(entries: np.ndarray, first: int) -> int:
+    """Number the marked entries (0) in order, from ``first`` on; return how many there are."""
+    marked = entries == 0
+    n = int(np.count_nonzero(marked))
+    entries[marked] = np.arange(first, first + n, dtype=np.int32)
+    return n
 
 
 def _check_order(coordinates: np.ndarray) -> None:

@@ -3,7 +3,7 @@
 An uncompressed zip of little-endian ``.npy`` arrays, no pickles; the same volume gives the same
 bytes. Keys of both kinds, with shape () unless said:
 
-- ``format``: text, ``meshsdf.narrow_band/1`` or ``meshsdf.grid/1``
+- ``format``: text, ``meshsdf.narrow_band/2`` or ``meshsdf.grid/1``
 - ``voxel_size``: float64, world units
 - ``sign``: text, how inside was told
 
@@ -14,8 +14,9 @@ Narrow band, b bricks of 8 x 8 x 8 nodes:
 - ``coordinates`` (b, 3) int64: brick coordinates, rising by x, then y, then z
 - ``values`` (b, 8, 8, 8) float32, or float16 when written with ``half``
 - ``active`` (b, 8) uint64: bit ``8 j + k`` of word i tells whether node (i, j, k) is in the band
-- ``page_origin`` (3,) int64, ``root`` (px, py, pz) int32, ``pages`` (p, 16, 16, 16) int32: the
-  page table; an entry is a page or slot (>= 0), -1 outside, -2 inside
+- ``page_origin`` (3,) int64, ``root`` (rx, ry, rz) int32, ``pages`` (p, 16, 16, 16) int32: the
+  page table; an entry is a page or slot (>= 0), -1 outside, -2 inside; ``root`` names the upper
+  pages, which come first, these name the lower ones, which name the slots
 - ``uncertain`` (b, 8) uint64: bits of nodes whose side is not certain, if there are such
 - ``closest_face`` (b, 8, 8, 8) int32 and ``barycentric`` (b, 8, 8, 8, 2) float32: if known
 
@@ -38,7 +39,7 @@ from .npy_archive import ZIP_ERRORS, ArchiveReader, ArrayHeader, write_archive
 from .registry import checked_input
 from .volume_checks import check_volume
 
-BAND = "meshsdf.narrow_band/1"
+BAND = "meshsdf.narrow_band/2"
 GRID = "meshsdf.grid/1"
 
 _B = "bricks"  # stands for one number in all the shapes it occurs in

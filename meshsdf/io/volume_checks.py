@@ -51,17 +51,20 @@ def check_index(index: BrickIndex) -> None:
             f"brick {coordinates[at + 1].tolist()} comes after {coordinates[at].tolist()}; "
             "bricks must rise by x, then y, then z"
         )
-    named = np.sort(root[root >= 0])
-    if not np.array_equal(named, np.arange(len(pages))):
-        raise ValueError(f"the root table does not name each of the {len(pages)} pages once")
-    n_slots = np.count_nonzero(pages >= 0)
+    n_upper = int(np.count_nonzero(root >= 0))
+    upper, lower = pages[:n_upper], pages[n_upper:]
+    named = np.sort(np.concatenate([root[root >= 0], upper[upper >= 0]]))
+    if not np.array_equal(named, np.arange(len(pages))) or (root >= n_upper).any():
+        raise ValueError(f"the page table does not name each of the {len(pages)} pages once")
+    n_slots = np.count_nonzero(lower >= 0)
     if n_slots != len(coordinates):
         raise ValueError(f"the pages hold {n_slots} slots for {len(coordinates)} bricks")
     local = coordinates - index.page_origin * 16
-    page = local >> 4
-    if ((page < 0) | (page >= root.shape)).any():
+    if ((local < 0) | (local >> 8 >= root.shape)).any():
         raise ValueError("a brick lies outside the root table")
-    number = root[tuple(page.T)]
+    number = root[tuple((local >> 8).T)]
+    if (number >= 0).all():
+        number = pages[(number, *(local >> 4 & 15).T)]
     if (number < 0).any():
         raise ValueError("a brick lies in a page that does not exist")
     if (pages[(number, *(local & 15).T)] != np.arange(len(coordinates))).any():

@@ -9,10 +9,11 @@ so the work is about one test per node of the band. The conditions are necessary
 soup: every face at an edge, and every edge at a vertex, adds its own half-space.
 
 Exactness: a region is widened by a slack that covers the rounding of its planes, so the closest
-feature of a node is never missed (flat edges, which have no region, are left out: `folds`); edge and vertex tests measure the true distance wherever they
-are applied, and a face is measured by its plane at most `FACE_SLACK` (or the rounding of its
-plane) outside its prism. Faces thinner than `SLIVER` have no trustworthy plane: they are measured
-by their closest point in a capsule around their longest edge, and impose nothing on their edges.
+feature of a node is never missed (flat edges have no region and are left out, see `folds`); edge
+and vertex tests measure the true distance wherever they are applied, and a face is measured by its
+plane at most `FACE_SLACK` (or the rounding of its plane) outside its prism. Faces thinner than
+`SLIVER` have no trustworthy plane: they are measured by their closest point in a capsule around
+their longest edge, and impose nothing on their edges.
 
 Lengths are in voxels; ``squared`` (b, 512) float64 and ``nearest`` (b, 512) int32 hold the slab's
 bricks from slot ``slot0`` on. Ties go to the lower face, so the order of work does not matter.

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from .brick_lookup import INSIDE, OUTSIDE
+from .brick_lookup import INSIDE, OUTSIDE, find_page
 from .point_triangle import closest_on_triangle
 
 NEGATIVE_ZERO = np.float32(-(2.0**-126))
@@ -48,7 +48,8 @@ def keep_active(
         else:
             x, y, z = coordinates[b, 0], coordinates[b, 1], coordinates[b, 2]
             code = INSIDE if inside[b, 0] & one else OUTSIDE
-            pages[root[x >> 4, y >> 4, z >> 4], x & 15, y & 15, z & 15] = code
+            page = find_page(root, pages, x >> 4, y >> 4, z >> 4)
+            pages[page, x & 15, y & 15, z & 15] = code
     return n
 
 
@@ -57,7 +58,8 @@ def renumber(coordinates, slot0, root, pages):
     """Write slot numbers ``slot0 + n`` for bricks (n, 3) of local coordinates into the pages."""
     for n in range(len(coordinates)):
         x, y, z = coordinates[n, 0], coordinates[n, 1], coordinates[n, 2]
-        pages[root[x >> 4, y >> 4, z >> 4], x & 15, y & 15, z & 15] = slot0 + n
+        page = find_page(root, pages, x >> 4, y >> 4, z >> 4)
+        pages[page, x & 15, y & 15, z & 15] = slot0 + n
 
 
 @njit(cache=True, nogil=True)

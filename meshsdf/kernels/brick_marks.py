@@ -1,16 +1,19 @@
 """Find the bricks near a mesh: conservative marks, then slots in lexicographic order.
 
-A cell (a brick of 8 nodes or a page of 128) is marked when the box of its nodes, grown by the
-reach, meets the triangle's box, its plane and the three planes through its edges; no cell that
-holds a node within reach of the mesh is missed.
+A cell (a brick of 8 nodes, or what a page covers: 128, 2048) is marked when the box of its nodes,
+grown by the reach, meets the triangle's box, its plane and the three planes through its edges; no
+cell that holds a node within reach of the mesh is missed.
 """
 
 import numpy as np
 from numba import njit
 
+from .brick_lookup import find_page
 from .clip import clip_line, triangle_range
 
 FEW_CELLS = 27
+LOWER, UPPER = 7, 11
+"""log2 of the nodes along one side of what a lower and an upper page cover."""
 
 
 @njit(cache=True, nogil=True)
@@ -83,14 +86,21 @@ def _within(points, p, box):
 
 
 @njit(cache=True, nogil=True)
+def _page_of(root, pages, shift, x, y, z):
+    """The page that has the entry of a cell, or a code."""
+    px, py, pz = x >> 4, y >> 4, z >> 4
+    if shift == LOWER:
+        return root[px, py, pz] if py < root.shape[1] and pz < root.shape[2] else np.int32(-1)
+    return find_page(root, pages, px, py, pz)
+
+
+@njit(cache=True, nogil=True)
 def _is_marked(root, pages, shift, x, y, z):
     """Tell whether a cell is marked, or lies where nothing is to be marked."""
-    if shift == 7:
+    if shift == UPPER:
         return y >= root.shape[1] or z >= root.shape[2] or root[x, y, z] == 0
-    px, py, pz = x >> 4, y >> 4, z >> 4
-    if py >= root.shape[1] or pz >= root.shape[2] or root[px, py, pz] < 0:
-        return True
-    return pages[root[px, py, pz], x & 15, y & 15, z & 15] == 0
+    page = _page_of(root, pages, shift, x, y, z)
+    return page < 0 or pages[page, x & 15, y & 15, z & 15] == 0
 
 
 @njit(cache=True, nogil=True)
@@ -110,8 +120,9 @@ def _are_marked(root, pages, shift, x0, x1, y0, y1, z0, z1):
 def mark_cells(points, faces, ids, reach, shift, cell0, cell1, root, pages):
     """Mark every cell with x coordinate in [cell0, cell1) that is near one of the faces ``ids``.
 
-    Cells have ``2**shift`` nodes a side: with shift 7 ``root`` is marked (0), with shift 3 the
-    entries of ``pages`` (0). Coordinates are local to the root table.
+    Cells have ``2**shift`` nodes a side: with shift `UPPER` the entries of ``root`` are marked (0),
+    with `LOWER` those of the upper pages, with 3 those of the lower ones. Coordinates are local
+    to the root table.
     """
     side = 1 << shift
     half = 0.5 * (side - 1)
@@ -169,13 +180,13 @@ def mark_cells(points, faces, ids, reach, shift, cell0, cell1, root, pages):
                     cz = z * side + half
                     if cz < low or cz > high:
                         continue
-                    if shift == 7:
-                        if y < root.shape[1] and z < root.shape[2]:
-                            root[x, y, z] = 0
+                    if _is_marked(root, pages, shift, x, y, z):
+                        continue
+                    if shift == UPPER:
+                        root[x, y, z] = 0
                     else:
-                        px, py, pz = x >> 4, y >> 4, z >> 4
-                        if py < root.shape[1] and pz < root.shape[2] and root[px, py, pz] >= 0:
-                            pages[root[px, py, pz], x & 15, y & 15, z & 15] = 0
+                        page = _page_of(root, pages, shift, x, y, z)
+                        pages[page, x & 15, y & 15, z & 15] = 0
 
 
 @njit(cache=True, nogil=True)
@@ -185,10 +196,9 @@ def list_bricks(root, pages, x, slot, coordinates):
     Writes their local coordinates when ``coordinates`` is not empty; returns how many there are.
     """
     n = 0
-    px = x >> 4
-    for y in range(root.shape[1] * 16):
-        for pz in range(root.shape[2]):
-            page = root[px, y >> 4, pz]
+    for y in range(root.shape[1] * 256):
+        for pz in range(root.shape[2] * 16):
+            page = find_page(root, pages, x >> 4, y >> 4, pz)
             if page < 0:
                 continue
             for z in range(16):

@@ -14,7 +14,7 @@ A crossing at height z is counted at node ceil(z) of its line, which lies within
 import numpy as np
 from numba import njit
 
-from .brick_lookup import INSIDE, find_brick
+from .brick_lookup import find_brick, mark_inside
 
 
 @njit(cache=True, nogil=True)
@@ -91,7 +91,7 @@ def resolve_signs(coordinates, crossings, parity, root, pages, inside):
 
     ``coordinates`` (b, 3) are the slab's bricks in lexicographic order, so every column of bricks
     is a run. Gaps between bricks of a column lie on one side as a whole; inner ones are coded in
-    ``pages`` (or ``root``, where a page is missing). Returns the number of lines whose crossings
+    ``pages`` (or ``root``). Returns the number of lines whose crossings
     do not cancel or disagree within a gap: 0 for a mesh with the two-set property.
     """
     leaks = 0
@@ -116,12 +116,7 @@ def resolve_signs(coordinates, crossings, parity, root, pages, inside):
                     if ((carry[line] & 1) if parity else carry[line] != 0) != state:
                         leaks += 1
                 if state:
-                    for between in range(z + 1, z + 1 + gap):
-                        page = root[x >> 4, y >> 4, between >> 4]
-                        if page < 0:
-                            root[x >> 4, y >> 4, between >> 4] = INSIDE
-                        else:
-                            pages[page, x & 15, y & 15, between & 15] = INSIDE
+                    mark_inside(root, pages, x, y, z + 1, z + 1 + gap)
         else:
             for line in range(64):
                 if (carry[line] & 1) if parity else carry[line] != 0:

@@ -11,10 +11,11 @@ import numpy as np
 
 from ..arrays import Number
 from ..grid import BrickIndex, NarrowBand
+from ..grid.brick_index import number_marked
 from ..kernels.band_distance import scan_edges, scan_faces, scan_vertices
 from ..kernels.brick_finish import closest_in_bricks, keep_active, renumber
 from ..kernels.brick_lookup import OUTSIDE
-from ..kernels.brick_marks import list_bricks, mark_cells
+from ..kernels.brick_marks import LOWER, UPPER, list_bricks, mark_cells
 from ..kernels.crossings import count_crossings, resolve_signs
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from ..progress import Progress
@@ -55,24 +56,36 @@ class BandBuilder:
         return self._collect()
 
     def _mark(self) -> None:
-        points, faces = self.placed.points, self.placed.faces
-        self.root = np.full(self.lattice.n_pages, OUTSIDE, np.int32)
-        ranges = even_ranges(len(faces), SLABS_PER_THREAD * n_threads())
-        nothing = np.empty((0, 16, 16, 16), np.int32)
-
-        def mark_pages(piece: int) -> None:
-            ids = np.arange(*ranges[piece], dtype=np.int32)
-            reach, root = self.half_width, self.root
-            mark_cells(points, faces, ids, reach, 7, 0, len(root), root, nothing)
-
-        run_pieces(mark_pages, len(ranges))
-        used = self.root == 0
-        n_pages = int(np.count_nonzero(used))
-        require_memory(n_pages * 16384, self.max_memory, where="mesh_to_band(...): page table")
-        self.root[used] = np.arange(n_pages, dtype=np.int32)
-        self.pages = np.full((n_pages, 16, 16, 16), OUTSIDE, np.int32)
+        """Mark what the root, then the upper, then the lower pages have entries for."""
+        size = -(-self.lattice.n_pages // 16)
+        self._require_pages(float(np.prod(size.astype(float))) / 4096)
+        self.root = np.full(size, OUTSIDE, np.int32)
+        self.pages = np.empty((0, 16, 16, 16), np.int32)
+        self._mark_all(UPPER, int(size[0]))
+        n_upper = number_marked(self.root, 0)
+        self.pages = np.full((n_upper, 16, 16, 16), OUTSIDE, np.int32)
+        self._mark_all(LOWER, 16 * int(size[0]))
+        n_lower = number_marked(self.pages, n_upper)
+        self._require_pages(n_upper + n_lower)
+        lower = np.full((n_lower, 16, 16, 16), OUTSIDE, np.int32)
+        self.pages = np.concatenate([self.pages, lower])
         self._cut_slabs()
         run_pieces(self._mark_slab, len(self.slabs), stage="bricks", progress=self.progress)
+
+    def _mark_all(self, shift: int, n_cells: int) -> None:
+        points, faces = self.placed.points, self.placed.faces
+        ranges = even_ranges(len(faces), SLABS_PER_THREAD * n_threads())
+
+        def mark(piece: int) -> None:
+            ids = np.arange(*ranges[piece], dtype=np.int32)
+            mark_cells(
+                points, faces, ids, self.half_width, shift, 0, n_cells, self.root, self.pages
+            )
+
+        run_pieces(mark, len(ranges))
+
+    def _require_pages(self, n_pages: Number) -> None:
+        require_memory(n_pages * 16384, self.max_memory, where="mesh_to_band(...): page table")
 
     def _cut_slabs(self) -> None:
         """Slabs of brick columns, and which faces, edges and vertices reach into each."""

@@ -17,6 +17,7 @@ from ..kernels.brick_finish import NEGATIVE_ZERO
 from ..kernels.open_signs import HALF
 from ..kernels.sign_changes import mark_mixed_faces
 from ..progress import Progress
+from .brick_gaps import BrickGaps
 from .lattice_winding import LatticeWinding
 from .memory import BYTES_PER_BRICK, require_memory
 from .placed_mesh import PlacedMesh
@@ -64,7 +65,7 @@ def sign_by_winding_number(
     del own
     everything = np.concatenate([band.index.coordinates, bricks])
     everything = everything[np.lexsort(everything.T[::-1])]
-    inner = _inner_bricks(winding, everything)
+    inner = _inner_runs(winding, everything)
     band = replace(band, sign="winding", uncertain=doubts)
     return _with_bricks(band, everything, inner, bricks, inside, more_doubts)
 
@@ -109,23 +110,14 @@ def _beyond_changes(
     return np.unique(candidates, axis=0)
 
 
-def _inner_bricks(winding: LatticeWinding, coordinates: np.ndarray) -> np.ndarray:
-    """Missing bricks that lie inside; each connected region of them is judged once."""
-    from scipy import ndimage  # only open meshes wait for it
-
-    low = coordinates.min(axis=0) - 1
-    missing = np.ones(coordinates.max(axis=0) - low + 2, bool)
-    missing[tuple((coordinates - low).T)] = False
-    regions, _ = ndimage.label(missing, structure=np.ones((3, 3, 3)))
-    outer = regions[0, 0, 0]
-    flat = regions.ravel()
-    _, first = np.unique(flat, return_index=True)
-    first = first[np.isin(flat[first], [0, outer], invert=True)]
-    if len(first) == 0:
-        return np.empty((0, 3), np.int64)
-    bricks = np.stack(np.unravel_index(first, regions.shape), axis=1) + low
-    inner = flat[first][np.abs(winding.at_centers(bricks)) > HALF]
-    return np.argwhere(np.isin(regions, inner)) + low
+def _inner_runs(winding: LatticeWinding, coordinates: np.ndarray) -> np.ndarray:
+    """Runs of missing bricks that lie inside; each connected region of them is judged once."""
+    gaps = BrickGaps.between(coordinates)
+    bricks = gaps.first_bricks()
+    if len(bricks) == 0:
+        return gaps.runs[:0]
+    is_inner = np.abs(winding.at_centers(bricks)) > HALF
+    return gaps.runs[(gaps.region >= 0) & is_inner[gaps.region]]
 
 
 def _with_bricks(

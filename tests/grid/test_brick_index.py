@@ -1,4 +1,4 @@
-"""meshsdf.grid: the two-level page table and the band that stands on it."""
+"""meshsdf.grid: the page table and the band that stands on it."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def some_bricks(seed: int, n: int, spread: int, offset: int = 0) -> np.ndarray:
 @given(
     st.integers(0, 1000),
     st.integers(1, 60),
-    st.sampled_from([2, 20, 200]),
+    st.sampled_from([2, 20, 200, 3000]),
     st.sampled_from([0, -7, 10**9, -(10**9)]),
 )
 def test_lookup_gives_every_brick_its_slot_and_nothing_else(seed, n, spread, offset):
@@ -35,11 +35,26 @@ def test_lookup_gives_every_brick_its_slot_and_nothing_else(seed, n, spread, off
 
 def test_inner_bricks_are_inside_and_so_is_a_page_without_bricks():
     shell = np.array([[0, 0, 0], [0, 0, 4], [40, 0, 0]])
-    inner = np.array([[0, 0, 2], [20, 3, 5]])
-    index = BrickIndex.from_coordinates(shell, inner)
-    assert_array_equal(index.lookup(inner), [INSIDE, INSIDE])
+    inner = np.array([[0, 0, 2], [0, 0, 3], [20, 3, 5]])
+    index = BrickIndex.from_coordinates(shell, np.array([[0, 0, 2, 4], [20, 3, 5, 6]]))
+    assert_array_equal(index.lookup(inner), [INSIDE, INSIDE, INSIDE])
     assert_array_equal(index.lookup(np.array([[0, 0, 1], [21, 3, 5]])), [OUTSIDE, INSIDE])
     assert_array_equal(index.lookup(shell), [0, 1, 2])
+
+
+def test_a_run_of_inner_bricks_passes_through_stored_and_missing_pages():
+    ends = np.array([[0, 0, 0], [0, 0, 20], [0, 0, 1000]])
+    index = BrickIndex.from_coordinates(ends, np.array([[0, 0, 21, 1000], [5, 5, -9, 2000]]))
+    asked = np.array([[0, 0, z] for z in (1, 19, 21, 32, 300, 999, 1001)])
+    assert_array_equal(index.lookup(asked), [OUTSIDE, OUTSIDE, *[INSIDE] * 4, OUTSIDE])
+    assert_array_equal(index.lookup(ends), [0, 1, 2])
+
+
+def test_the_table_of_a_long_diagonal_stays_small():
+    step = np.arange(20000)
+    index = BrickIndex.from_coordinates(np.stack([step] * 3, axis=1))
+    assert index.root.nbytes + index.pages.nbytes < 30e6  # a dense table of pages: 7.8e9
+    assert_array_equal(index.lookup(np.array([[7, 7, 7], [19999] * 3, [7, 7, 8]])), [7, 19999, -1])
 
 
 def test_bricks_out_of_order_or_twice_are_refused():
@@ -56,7 +71,7 @@ def test_an_empty_index_is_outside_everywhere():
 
 def small_band() -> NarrowBand:
     """Two bricks with a few active nodes of known values."""
-    index = BrickIndex.from_coordinates(np.array([[-1, 0, 0], [0, 0, 2]]), np.array([[0, 0, 1]]))
+    index = BrickIndex.from_coordinates(np.array([[-1, 0, 0], [0, 0, 2]]), np.array([[0, 0, 1, 2]]))
     values = np.full((2, 8, 8, 8), 3.0, np.float32)
     active = np.zeros((2, 8), np.uint64)
     for slot, (i, j, k), value in ((0, (7, 1, 2), -1.5), (1, (0, 7, 7), 0.5), (1, (3, 0, 1), 0.0)):

@@ -93,7 +93,7 @@ def test_plain_numpy_opens_the_documented_keys_without_pickles(tmp_path):
     band = narrow_band(1, with_faces=True)
     write_npz(tmp_path / "a.npz", band)
     with np.load(tmp_path / "a.npz", allow_pickle=False) as found:
-        assert found["format"] == "meshsdf.narrow_band/1"
+        assert found["format"] == "meshsdf.narrow_band/2"
         assert found["sign"] == band.sign
         assert found["voxel_size"] == band.voxel_size
         assert found["half_width"] == band.half_width
@@ -111,7 +111,7 @@ def test_the_header_alone_tells_what_is_in_the_file(tmp_path):
     facts = probe_npz(tmp_path / "a.npz")
     assert facts == {
         "kind": "narrow_band",
-        "format": "meshsdf.narrow_band/1",
+        "format": "meshsdf.narrow_band/2",
         "voxel_size": band.voxel_size,
         "half_width": band.half_width,
         "translation": band.translation.tolist(),
@@ -281,7 +281,7 @@ def band_arrays(**changes):
     coordinates = np.array([[0, 0, 0], [0, 0, 1], [0, 0, 17]])
     index = BrickIndex.from_coordinates(coordinates)
     return {
-        "format": np.array("meshsdf.narrow_band/1"),
+        "format": np.array("meshsdf.narrow_band/2"),
         "voxel_size": np.array(0.5),
         "translation": np.zeros(3),
         "half_width": np.array(3.0),
@@ -305,16 +305,20 @@ def test_page_tables_that_would_lead_a_loop_astray_are_refused(tmp_path):
     whole = band_arrays()
     root, pages, coordinates = whole["root"], whole["pages"], whole["coordinates"]
     cases = [
-        ({"pages": changed(pages, (0, 0, 0, 0), 3)}, "another slot"),
-        ({"pages": changed(pages, (0, 0, 0, 0), 1)}, "another slot"),
-        ({"pages": changed(pages, (0, 5, 0, 0), 2)}, "4 slots for 3 bricks"),
-        ({"pages": changed(pages, (0, 0, 0, 0), -1)}, "2 slots for 3 bricks"),
-        ({"root": changed(root, (0, 0, 0), 2)}, "does not name each of the 2 pages once"),
-        ({"root": changed(root, (0, 0, 0), 1)}, "does not name each of the 2 pages once"),
-        ({"root": root[:, :, ::-1].copy()}, "another slot"),
+        ({"pages": changed(pages, (1, 0, 0, 0), 3)}, "another slot"),
+        ({"pages": changed(pages, (1, 0, 0, 0), 1)}, "another slot"),
+        ({"pages": changed(pages, (1, 5, 0, 0), 2)}, "4 slots for 3 bricks"),
+        ({"pages": changed(pages, (1, 0, 0, 0), -1)}, "2 slots for 3 bricks"),
+        ({"pages": changed(pages, (0, 0, 0, 0), 2)}, "does not name each of the 3 pages once"),
+        ({"pages": changed(pages, (0, 5, 5, 5), 7)}, "does not name each of the 3 pages once"),
+        ({"pages": pages[[0, 2, 1]].copy()}, "another slot"),
+        ({"pages": pages[[1, 0, 2]].copy()}, "does not name each of the 3 pages once"),
+        ({"root": changed(root, (0, 0, 0), 2)}, "does not name each of the 3 pages once"),
+        ({"root": changed(root, (0, 0, 0), -2)}, "does not name each of the 3 pages once"),
         ({"coordinates": coordinates[::-1].copy()}, "comes after"),
         ({"coordinates": changed(coordinates, (1, 2), 0)}, "comes after"),
-        ({"coordinates": changed(coordinates, (2, 2), 99)}, "outside the root table"),
+        ({"coordinates": changed(coordinates, (2, 2), 999)}, "outside the root table"),
+        ({"coordinates": changed(coordinates, (2, 2), 99)}, "a page that does not exist"),
         ({"coordinates": changed(coordinates, (2, 2), 2**62)}, "too large"),
         ({"coordinates": changed(coordinates, (0, 0), -(2**63))}, "too large"),
         ({"page_origin": np.array([0, 0, 1])}, "outside the root table"),

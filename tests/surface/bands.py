@@ -3,7 +3,7 @@
 import numpy as np
 
 from meshsdf.grid import BrickIndex, Grid, NarrowBand
-from meshsdf.grid.brick_index import INSIDE
+from meshsdf.kernels.brick_lookup import mark_runs_inside
 
 
 def sphere_distance(points, center=(0.0, 0.0, 0.0), radius=1.0):
@@ -31,9 +31,8 @@ def band_from_blocks(blocks, lower, half_width, voxel_size=1.0, translation=(0.0
     stored = (np.abs(flat) < background).any(axis=(1, 2, 3))
     stored |= flat.min(axis=(1, 2, 3)) != flat.max(axis=(1, 2, 3))
     everywhere = np.argwhere(np.ones(n_blocks, bool)) + np.asarray(lower, np.int64)
-    index = BrickIndex.from_coordinates(everywhere[stored])
     inside = everywhere[~stored & (flat[:, 0, 0, 0] < 0)]
-    mark_inside(index, inside)
+    index = BrickIndex.from_coordinates(everywhere[stored], runs_of(inside))
     values = flat[stored]
     active = np.packbits((np.abs(values) < background).reshape(-1, 8, 64), -1, "little")
     return NarrowBand(
@@ -48,13 +47,13 @@ def band_from_blocks(blocks, lower, half_width, voxel_size=1.0, translation=(0.0
 
 
 def mark_inside(index, bricks):
-    """Enter INSIDE in the page table, which must have a page there."""
-    page, entry = bricks // 16 - index.page_origin, bricks % 16
-    assert (page >= 0).all()
-    assert (page < index.root.shape).all()
-    number = index.root[tuple(page.T)]
-    assert (number >= 0).all()
-    index.pages[(number, *entry.T)] = INSIDE
+    """Enter INSIDE in the page table."""
+    mark_runs_inside(index.root, index.pages, runs_of(bricks - index.origin))
+
+
+def runs_of(bricks):
+    """Bricks (n, 3) as runs of one."""
+    return np.column_stack([bricks, bricks[:, 2] + 1])
 
 
 def blocks_from_nodes(values):
