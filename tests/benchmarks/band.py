@@ -1,6 +1,6 @@
 """How fast and how lean is the signed band, beside OpenVDB's createLevelSetFromPolygons?
 
-python -m tests.benchmarks.band [--mesh NAME|subdivided] [--repeats N] [RESOLUTION ...]
+python -m tests.benchmarks.band [--mesh NAME|subdivided] [--repeats N] [--stages] [RESOLUTION ...]
 
 Each run is a process of its own, ours and OpenVDB's in alternation; timers stand around the calls
 alone, peak memory is the whole process's. Both must find nearly the same number of active voxels.
@@ -38,8 +38,8 @@ def subdivided(mesh: Mesh, times: int) -> Mesh:
     return Mesh(np.asarray(vertices), np.asarray(faces, np.int32))
 
 
-def measure(path: str, resolution: str, repeats: int) -> dict[str, dict[str, float]]:
-    """Median seconds and peak megabytes of both."""
+def measure(path: str, resolution: str, repeats: int) -> dict[str, dict]:
+    """Median seconds and peak megabytes of both, and the seconds of our stages."""
     commands = {
         "meshsdf": [sys.executable, str(OURS), path, resolution],
         "OpenVDB": [SYSTEM_PYTHON, str(RIVAL), path, "-", resolution],
@@ -52,6 +52,7 @@ def measure(path: str, resolution: str, repeats: int) -> dict[str, dict[str, flo
         name: {
             "seconds": median([one["seconds"] for one in each]),
             "MB": median([one["peak"] / 1e6 for one in each]),
+            "stages": each[0].get("stages"),
         }
         for name, each in found.items()
     }
@@ -67,6 +68,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--mesh", default="armadillo.obj")
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--stages", action="store_true", help="also print where our time goes")
     parser.add_argument("resolutions", nargs="*", default=["128", "256", "512", "1024", "2048"])
     asked = parser.parse_args()
     name = "armadillo.obj" if asked.mesh == "subdivided" else asked.mesh
@@ -89,6 +91,9 @@ def main() -> None:
                 f"{ours['MB'] / theirs['MB']:7.2f}x",
                 flush=True,
             )
+            if asked.stages:
+                stages = ours["stages"].items()
+                print("       " + ", ".join(f"{stage} {seconds:.3f}" for stage, seconds in stages))
     if len(rows) > 1:
         time = slope(asked.resolutions, [row["seconds"] for row in rows])
         memory = slope(asked.resolutions, [row["MB"] for row in rows])

@@ -11,7 +11,23 @@ import time
 import numpy as np
 from peak import peak_bytes
 
-from meshsdf import Mesh, mesh_to_band
+from meshsdf import Mesh, check, mesh_to_band
+
+
+def stages_of(mesh, resolution):
+    """Seconds of each stage, in a run of its own, by when progress is told."""
+    seconds, last = {}, [time.perf_counter()]
+
+    def progress(stage, _):
+        now = time.perf_counter()
+        seconds[stage] = seconds.get(stage, 0.0) + now - last[0]
+        last[0] = now
+
+    report = check(mesh, self_intersections=False)
+    progress("check", 1.0)
+    mesh_to_band(mesh, resolution=resolution, report=report, progress=progress)
+    progress("rest", 1.0)
+    return {stage: round(time, 3) for stage, time in seconds.items() if stage}
 
 
 def main(path, resolution):
@@ -21,7 +37,10 @@ def main(path, resolution):
     begin = time.perf_counter()
     band = mesh_to_band(Mesh(points, faces), resolution=float(resolution))
     seconds = time.perf_counter() - begin
-    print(json.dumps({"seconds": seconds, "n_active": band.n_active, "peak": peak_bytes()}))
+    result = {"seconds": seconds, "n_active": band.n_active, "peak": peak_bytes()}
+    del band
+    result["stages"] = stages_of(Mesh(points, faces), float(resolution))
+    print(json.dumps(result))
 
 
 main(*sys.argv[1:])
