@@ -20,7 +20,7 @@ FLOORS = [
     {"kernels"},
     {"box"},
     {"arrays"},
-    {"progress"},
+    {"progress", "srgb"},
     {"errors"},
 ]
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from ..mesh import Material, Mesh
+from ..srgb import linear_rgba, srgb_rgba
 from .mtl import read_materials
 from .obj_faces import Defined, corner_indices
 from .polygons import checked_faces, fan_corners
-from .srgb import linear_rgba, srgb_rgba
 from .text_rows import Rows, rows, token_counts
 from .warn import Warn
 

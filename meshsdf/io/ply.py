@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ..mesh import Material, Mesh
+from ..srgb import linear_rgba, srgb_rgba
 from .images import read_image
 from .ply_elements import Element, List, header_and_body, read_elements
 from .polygons import checked_faces, fan_corners
-from .srgb import linear_rgba, srgb_rgba
 from .warn import Warn
 
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
