@@ -139,7 +139,10 @@ class BandBuilder:
 
     def _require_memory(self, n_bricks: int) -> None:
         needed = band_bytes(
-            n_bricks / MARKED_PER_KEPT, len(self.placed.faces), closest=self.closest
+            n_bricks / MARKED_PER_KEPT,
+            len(self.placed.faces),
+            closest=self.closest,
+            fold_share=len(self.features.ends) / max(1, self.placed.table.n_edges),
         )
         where = f"mesh_to_band(...): {n_bricks} bricks"
         require_memory(needed, self.max_memory, where=where)

@@ -14,7 +14,7 @@ from ..mesh.welded import weld_mesh
 from ..progress import Progress, silent
 from .band_builder import BandBuilder
 from .lattice import Lattice, resolve_voxel_size
-from .memory import band_bytes, estimate_bricks, require_memory
+from .memory import band_bytes, estimate_bricks, estimate_fold_share, require_memory
 from .open_sign import sign_by_winding_number
 from .placed_mesh import place
 from .sign import SignMethod, choose_sign
@@ -147,7 +147,8 @@ def _check_memory(
 ) -> None:
     n_bricks = estimate_bricks(mesh, size, half_width)
     where = f"mesh_to_band(voxel_size={size:g}): about {n_bricks:.3g} bricks of 8x8x8 nodes"
-    needed = band_bytes(n_bricks, mesh.n_faces, closest=closest)
+    folds = estimate_fold_share(mesh, half_width)
+    needed = band_bytes(n_bricks, mesh.n_faces, closest=closest, fold_share=folds)
     require_memory(needed, max_memory, where=where)
 
 
