@@ -29,52 +29,91 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .errors import MeshsdfError
     from .grid import Grid, NarrowBand
+    from .implicit import Exactness, Implicit, from_function
     from .io import read_mesh, read_volume, write_mesh, write_volume
     from .mesh import Mesh, TwoSetReport, check
     from .report import Comparison, Enclosure, RoundTrip, compare, roundtrip
     from .sdf import MeshDistance, mesh_to_band, mesh_to_grid
-    from .surface import marching_cubes
+    from .surface import (
+        Curve,
+        Curves,
+        MeshPart,
+        carry,
+        continue_surface,
+        find_seeds,
+        marching_cubes,
+        marching_cubes_slices,
+        marching_squares,
+        marching_squares_rows,
+        singular_cells,
+    )
 
 _HOME = {
     "Comparison": "report",
+    "Curve": "surface",
+    "Curves": "surface",
     "Enclosure": "report",
+    "Exactness": "implicit",
     "Grid": "grid",
+    "Implicit": "implicit",
     "Mesh": "mesh",
     "MeshDistance": "sdf",
+    "MeshPart": "surface",
     "MeshsdfError": "errors",
     "NarrowBand": "grid",
     "RoundTrip": "report",
     "TwoSetReport": "mesh",
+    "carry": "surface",
     "check": "mesh",
     "compare": "report",
+    "continue_surface": "surface",
+    "find_seeds": "surface",
+    "from_function": "implicit",
     "marching_cubes": "surface",
+    "marching_cubes_slices": "surface",
+    "marching_squares": "surface",
+    "marching_squares_rows": "surface",
     "mesh_to_band": "sdf",
     "mesh_to_grid": "sdf",
     "read_mesh": "io",
     "read_volume": "io",
     "roundtrip": "report",
+    "singular_cells": "surface",
     "write_mesh": "io",
     "write_volume": "io",
 }
 
 __all__ = [
     "Comparison",
+    "Curve",
+    "Curves",
     "Enclosure",
+    "Exactness",
     "Grid",
+    "Implicit",
     "Mesh",
     "MeshDistance",
+    "MeshPart",
     "MeshsdfError",
     "NarrowBand",
     "RoundTrip",
     "TwoSetReport",
+    "carry",
     "check",
     "compare",
+    "continue_surface",
+    "find_seeds",
+    "from_function",
     "marching_cubes",
+    "marching_cubes_slices",
+    "marching_squares",
+    "marching_squares_rows",
     "mesh_to_band",
     "mesh_to_grid",
     "read_mesh",
     "read_volume",
     "roundtrip",
+    "singular_cells",
     "write_mesh",
     "write_volume",
 ]

@@ -41,6 +41,10 @@ class SpatialError(MeshsdfError):
     """A query on a mesh cannot be answered."""
 
 
+class ImplicitError(MeshsdfError):
+    """An implicit function cannot be made, or does not give what it should."""
+
+
 class SdfError(MeshsdfError):
     """A mesh cannot be turned into distances as asked."""
 

@@ -3,7 +3,7 @@
 import click
 
 from .console import YES, Console, plural
-from .options import Number, force_option, json_option, path
+from .options import Names, Number, force_option, json_option, path
 
 
 @click.command(epilog="Example: meshsdf mesh bunny.npz bunny.ply")
@@ -28,19 +28,47 @@ from .options import Number, force_option, json_option, path
     show_default=True,
     help="What happens where a dense grid ends.",
 )
+@click.option(
+    "--topology",
+    type=click.Choice(["manifold", "trilinear"]),
+    default="manifold",
+    show_default=True,
+    help="What cells hold whose signs leave a choice: inside parts kept apart, or as the trilinear "
+    "interpolant has it.",
+)
+@click.option(
+    "--carry",
+    type=Names("colours", "uv"),
+    help="Give the mesh what the one of --source has: colours, uv or colours,uv.",
+)
+@click.option("--source", type=path, help="The mesh that VOLUME was made from, for --carry.")
 @force_option
 @json_option
 def command(
-    volume: str, out: str, method: str, level: float | None, border: str, force: bool, as_json: bool
+    volume: str,
+    out: str,
+    method: str,
+    level: float | None,
+    border: str,
+    topology: str,
+    carry: tuple[str, ...] | None,
+    source: str | None,
+    force: bool,
+    as_json: bool,
 ) -> int:
     """Extract the surface of VOLUME as a closed, oriented, manifold mesh, OUT."""
     console = Console("mesh", as_json=as_json)
     console.watch_compilation()
-    from ..io import check_input, check_output, read_volume, write_mesh
+    from ..io import check_input, check_output, read_mesh, read_volume, write_mesh
     from ..mesh.measures import euler_number, is_watertight
     from ..surface import default_level, marching_cubes, require_faces
+    from ..surface import carry as carry_attributes
 
+    if (carry is None) != (source is None):
+        raise click.UsageError("--carry and --source go together")
     check_input(volume, kind="volume")
+    if source is not None:
+        check_input(source, kind="mesh")
     check_output(out, kind="mesh", force=force)
     with console.stage("load"):
         loaded = read_volume(volume)
@@ -48,16 +76,18 @@ def command(
         level, warnings = default_level(loaded)
         for warning in warnings:
             console.warn(warning)
-    surface = marching_cubes(loaded, level=level, border=border, progress=console.progress)
+    surface = marching_cubes(
+        loaded, level=level, border=border, topology=topology, progress=console.progress
+    )
     require_faces(surface, level=level)
+    shape = {"is_watertight": is_watertight(surface), "euler_number": euler_number(surface)}
+    if source is not None:
+        with console.stage("carry"):
+            owner = read_mesh(source, warn=console.warn)
+            surface = carry_attributes(surface, owner, carry, progress=console.progress)
     with console.stage("write"):
         write_mesh(out, surface, force=force)
-    facts = {
-        "n_vertices": surface.n_vertices,
-        "n_faces": surface.n_faces,
-        "is_watertight": is_watertight(surface),
-        "euler_number": euler_number(surface),
-    }
+    facts = {"n_vertices": surface.n_vertices, "n_faces": surface.n_faces, **shape}
     closed = "closed" if facts["is_watertight"] else "open at the grid's border"
     seconds = console.timings("load", "surface", "write")
     console.result(

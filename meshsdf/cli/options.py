@@ -47,6 +47,23 @@ class Resolutions(click.ParamType):
         return tuple(PositiveNumber().convert(part, param, ctx) for part in parts)
 
 
+class Names(click.ParamType):
+    """Comma-separated names out of a few."""
+
+    def __init__(self, *names: str) -> None:
+        self.names = names
+        self.name = ",".join(names)
+
+    def convert(self, value, param, ctx):
+        if isinstance(value, tuple):
+            return value
+        found = tuple(part.strip() for part in value.split(","))
+        for part in found:
+            if part not in self.names:
+                self.fail(f"{part!r} is not one of {', '.join(self.names)}", param, ctx)
+        return found
+
+
 class Bytes(click.ParamType):
     """A size such as 500M, 4G or 1.5e9."""
 

@@ -62,24 +62,20 @@ def cut_blocks(values, corners, start, stop, bricks):
 @njit(cache=True, nogil=True)
 def classify_bricks(values, level, start, stop, inside, valid):
     """Set the bits of nodes below the level, and of nodes that are not NaN."""
+    rows = values.reshape((len(values), 8, 64))  # one loop of known length: vector instructions
     for w in range(start, stop):
         for i in range(8):
-            word = NONE
-            known = ALL
-            for j in range(8):
-                for k in range(8):
-                    value = values[w, i, j, k]
-                    bit = ONE << np.uint64(8 * j + k)
-                    if value < level:
-                        word |= bit
-                    if value != value:
-                        known ^= bit
-            inside[w, i] = word
-            valid[w, i] = known
+            row = rows[w, i]
+            below, missing = NONE, NONE
+            for bit in range(64):
+                below |= np.uint64(row[bit] < level) << np.uint64(bit)
+                missing |= np.uint64(row[bit] != row[bit]) << np.uint64(bit)
+            inside[w, i] = below
+            valid[w, i] = ~missing
 
 
 @njit(cache=True, nogil=True)
-def _count_bits(word):
+def count_bits(word):
     """Population count by halving; the compiler turns it into one instruction."""
     word = word - ((word >> ONE) & np.uint64(0x5555555555555555))
     word = (word & np.uint64(0x3333333333333333)) + (
@@ -90,13 +86,13 @@ def _count_bits(word):
 
 
 @njit(cache=True, nogil=True)
-def _lowest_bit(word):
+def lowest_bit(word):
     """Position of the lowest set bit of a word that is not zero."""
-    return _count_bits((word & (~word + ONE)) - ONE)
+    return count_bits((word & (~word + ONE)) - ONE)
 
 
 @njit(cache=True, nogil=True)
-def _corner_words(words, near, w, i, corners):
+def corner_words(words, near, w, i, corners):
     """``corners[4 x + 2 y + z]``: bits of the nodes (i + x, j + y, k + z), each where (j, k) is."""
     for x in range(2):
         beyond = (i + x) >> 3
@@ -114,7 +110,7 @@ def _corner_words(words, near, w, i, corners):
 
 
 @njit(cache=True, nogil=True)
-def _mixed_cells(signs, known):
+def mixed_cells(signs, known):
     """Return the cells whose corners are all known and not all of one sign."""
     some = NONE
     every = ALL
@@ -127,7 +123,7 @@ def _mixed_cells(signs, known):
 
 
 @njit(cache=True, nogil=True)
-def _pattern(signs, cell):
+def pattern_of(signs, cell):
     """Return the sign pattern of a cell: bit c where corner c is inside."""
     pattern = NONE
     for c in range(8):
@@ -136,27 +132,32 @@ def _pattern(signs, cell):
 
 
 @njit(cache=True, nogil=True)
-def count_bricks(inside, valid, near, case_sizes, start, stop, crossings, n_faces):
-    """Write the crossing words ``crossings[w, 8 a + i]`` and the number of faces of each brick."""
+def count_bricks(inside, valid, near, sizes, start, stop, crossings, counts):
+    """Write the crossing words ``crossings[w, 8 a + i]`` and ``counts[w]``.
+
+    These are the faces of each brick, and its special cells, whose faces are not among them.
+    """
     signs = np.empty(8, np.uint64)
     known = np.empty(8, np.uint64)
     for w in range(start, stop):
-        total = 0
+        n_faces, n_special = 0, 0
         for i in range(8):
-            _corner_words(inside, near, w, i, signs)
-            _corner_words(valid, near, w, i, known)
+            corner_words(inside, near, w, i, signs)
+            corner_words(valid, near, w, i, known)
             for axis in range(3):
                 o = 4 >> axis
                 crossings[w, 8 * axis + i] = (signs[0] ^ signs[o]) & known[0] & known[o]
-            cells = _mixed_cells(signs, known)
+            cells = mixed_cells(signs, known)
             while cells != NONE:
-                total += case_sizes[_pattern(signs, np.uint64(_lowest_bit(cells)))]
+                pattern = pattern_of(signs, np.uint64(lowest_bit(cells)))
                 cells &= cells - ONE
-        n_faces[w] = total
+                n_faces += sizes[pattern, 0]
+                n_special += sizes[pattern, 1]
+        counts[w, 0], counts[w, 1] = n_faces, n_special
 
 
 @njit(cache=True, nogil=True)
-def _node_value(values, inside, background, w, i, j, k):
+def node_value(values, inside, background, w, i, j, k):
     """Return the stored value, or what a constant brick stands for."""
     if 0 <= w < len(values):
         return np.float64(values[w, i, j, k])
@@ -166,7 +167,7 @@ def _node_value(values, inside, background, w, i, j, k):
 
 
 @njit(cache=True, nogil=True)
-def _crossing(a, b, level, toward_infinity):
+def crossing(a, b, level, toward_infinity):
     """Return where the line from a to b meets the level, as a fraction in [0, 1] of the edge.
 
     An infinite end says nothing of the place: that is then ``toward_infinity`` of the way from
@@ -200,18 +201,18 @@ def fill_vertices(values, inside, near, crossings, first, corners, place, start,
             axis, i = word >> 3, word & 7
             v = first[w, word]
             while bits != NONE:
-                bit = _lowest_bit(bits)
+                bit = lowest_bit(bits)
                 bits &= bits - ONE
                 j, k = bit >> 3, bit & 7
-                a = _node_value(values, inside, background, w, i, j, k)
+                a = node_value(values, inside, background, w, i, j, k)
                 # The upper end, perhaps in the next brick
                 i1, j1, k1 = i + (axis == 0), j + (axis == 1), k + (axis == 2)
                 o = near[w, ((i1 >> 3) << 2) | ((j1 >> 3) << 1) | (k1 >> 3)]
-                b = _node_value(values, inside, background, o, i1 & 7, j1 & 7, k1 & 7)
+                b = node_value(values, inside, background, o, i1 & 7, j1 & 7, k1 & 7)
                 node[0] = corners[w, 0] + i
                 node[1] = corners[w, 1] + j
                 node[2] = corners[w, 2] + k
-                node[axis] += _crossing(a, b, level, toward_infinity)
+                node[axis] += crossing(a, b, level, toward_infinity)
                 for x in range(3):
                     vertices[v, x] = voxel_size * node[x] + place[4 + x]
                 v += 1
@@ -219,28 +220,35 @@ def fill_vertices(values, inside, near, crossings, first, corners, place, start,
 
 @njit(cache=True, nogil=True)
 def fill_faces(
-    inside, valid, near, crossings, first, first_face, crossed, triangles, start, stop, faces
-):
-    """Write the faces of bricks ``start <= w < stop``, beginning at ``first_face[w]``."""
+    inside, valid, near, crossings, first, first_face, cases, first_special, rows, centers,
+    start, stop, faces,
+):  # fmt: skip
+    """Write the faces of bricks ``start <= w < stop``, beginning at ``first_face[w]``.
+
+    ``cases`` holds crossed, is_special and triangles of `CellCases`; ``rows[s]`` is the row of
+    special cell s and ``centers[s]`` the number of its first vertex within.
+    """
+    crossed, is_special, triangles = cases
     signs = np.empty(8, np.uint64)
     known = np.empty(8, np.uint64)
-    vertex = np.empty(12, np.int32)
+    vertex = np.empty(14, np.int64)
     for w in range(start, stop):
-        f = first_face[w]
+        f, s = first_face[w], first_special[w]
         if f == first_face[w + 1]:
             continue
         for i in range(8):
-            _corner_words(inside, near, w, i, signs)
-            _corner_words(valid, near, w, i, known)
-            cells = _mixed_cells(signs, known)
+            corner_words(inside, near, w, i, signs)
+            corner_words(valid, near, w, i, known)
+            cells = mixed_cells(signs, known)
             while cells != NONE:
-                cell = _lowest_bit(cells)
+                cell = lowest_bit(cells)
                 cells &= cells - ONE
-                pattern = _pattern(signs, np.uint64(cell))
+                pattern = pattern_of(signs, np.uint64(cell))
                 # Number of the vertex on each crossed edge: first of its word, plus its rank
-                for e in range(12):
-                    if not (crossed[pattern] >> e) & 1:
-                        continue
+                edges = np.uint64(crossed[pattern])
+                while edges != NONE:
+                    e = lowest_bit(edges)
+                    edges &= edges - ONE
                     axis, u, v = e >> 2, (e >> 1) & 1, e & 1
                     i1 = i + (u if axis > 0 else 0)
                     j1 = (cell >> 3) + (u if axis == 0 else (v if axis == 2 else 0))
@@ -248,10 +256,15 @@ def fill_faces(
                     o = near[w, ((i1 >> 3) << 2) | ((j1 >> 3) << 1) | (k1 >> 3)]
                     word = 8 * axis + (i1 & 7)
                     below = (ONE << np.uint64(8 * (j1 & 7) + (k1 & 7))) - ONE
-                    vertex[e] = first[o, word] + _count_bits(crossings[o, word] & below)
+                    vertex[e] = first[o, word] + count_bits(crossings[o, word] & below)
+                row = pattern
+                if is_special[pattern]:
+                    row = np.int64(rows[s])
+                    vertex[12], vertex[13] = centers[s], centers[s] + 1
+                    s += 1
                 t = 0
-                while t < triangles.shape[1] and triangles[pattern, t] >= 0:
+                while t < triangles.shape[1] and triangles[row, t] >= 0:
                     for c in range(3):
-                        faces[f, c] = vertex[triangles[pattern, t + c]]
+                        faces[f, c] = vertex[triangles[row, t + c]]
                     f += 1
                     t += 3

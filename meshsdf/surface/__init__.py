@@ -1,6 +1,27 @@
 """field -> mesh: marching squares and cubes, dual contouring."""
 
+from .carry import carry
+from .continuation import continue_surface
+from .curves import Curve, Curves
 from .level import default_level, require_faces
-from .marching_cubes import marching_cubes
+from .marching_cubes import marching_cubes, singular_cells
+from .marching_slices import marching_cubes_slices
+from .marching_squares import marching_squares, marching_squares_rows
+from .plane_sweep import MeshPart
+from .seeds import find_seeds
 
-__all__ = ["default_level", "marching_cubes", "require_faces"]
+__all__ = [
+    "Curve",
+    "Curves",
+    "MeshPart",
+    "carry",
+    "continue_surface",
+    "default_level",
+    "find_seeds",
+    "marching_cubes",
+    "marching_cubes_slices",
+    "marching_squares",
+    "marching_squares_rows",
+    "require_faces",
+    "singular_cells",
+]

@@ -137,7 +137,7 @@ def _classify(
     valid = np.full((n + 3, BRICK), _ALL)
     valid[NO_DATA] = 0
     inside[INSIDE] = _ALL
-    threshold = _threshold(level, values.dtype)
+    threshold = least_not_below(level, values.dtype)
     in_ranges(
         lambda start, stop: classify_bricks(values, threshold, start, stop, inside, valid),
         n,
@@ -147,7 +147,7 @@ def _classify(
     return inside, valid
 
 
-def _threshold(level: float, dtype: np.dtype) -> np.floating:
+def least_not_below(level: float, dtype: np.dtype) -> np.floating:
     """The least number of the type that is not below the level: v < level <=> v < threshold."""
     with np.errstate(over="ignore"):
         threshold = dtype.type(level)
@@ -198,10 +198,12 @@ def _ghosts(
 
 def _differ(inside: np.ndarray, code: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Which bricks hold, among the given nodes, one of another sign than a missing neighbour."""
-    words = inside & nodes
-    return ((code == INSIDE) & (words != nodes).any(axis=1)) | (
-        (code == OUTSIDE) & (words != 0).any(axis=1)
-    )
+    differs = np.zeros(len(code), bool)
+    for state, expected in ((INSIDE, nodes), (OUTSIDE, np.zeros_like(nodes))):
+        rows = np.flatnonzero(code == state)
+        for word in np.flatnonzero(nodes):
+            differs[rows] |= (inside[rows, word] & nodes[word]) != expected[word]
+    return differs
 
 
 def _check_missing(near: np.ndarray, coordinates: np.ndarray) -> None:
@@ -222,7 +224,7 @@ def _blocks_to_keep(values: np.ndarray, level: float, shift: int, progress: Prog
     """Blocks that own a cell with both signs, and the blocks such cells reach into."""
     shape = tuple((n + 2 * shift + BRICK - 1) // BRICK for n in values.shape)
     has_inside, has_outside = np.zeros(shape, bool), np.zeros(shape, bool)
-    threshold = _threshold(level, values.dtype)
+    threshold = least_not_below(level, values.dtype)
     in_ranges(
         lambda start, stop: flag_blocks(
             values, threshold, shift, start, stop, has_inside, has_outside

@@ -81,8 +81,11 @@ class CubeCases:
     triangles: Int8[np.ndarray, "256 t"]
 
 
-def face_arcs(pattern: int, face: int) -> dict[int, int]:
-    """Return {edge the arc starts from: edge it ends at} for one face of a pattern."""
+def face_arcs(pattern: int, face: int, *, joined: bool = False) -> dict[int, int]:
+    """Return {edge the arc starts from: edge it ends at} for one face of a pattern.
+
+    With ``joined`` the inside corners of a face with alternating signs hang together.
+    """
     inside = [bool(pattern >> corner & 1) for corner in FACES[face]]
     arcs = {}
     for n in range(4):
@@ -92,14 +95,20 @@ def face_arcs(pattern: int, face: int) -> dict[int, int]:
         while inside[(last + 1) % 4]:
             last += 1
         arcs[_FACE_EDGES[face][n]] = _FACE_EDGES[face][last % 4]
+    if joined and len(arcs) == 2:
+        (first, one), (second, other) = arcs.items()
+        arcs = {first: other, second: one}
     return arcs
 
 
-def loops(pattern: int) -> list[tuple[int, ...]]:
-    """Return the closed loops of a pattern as edges in order, the lowest edge first."""
+def loops(pattern: int, joined_faces: int = 0) -> list[tuple[int, ...]]:
+    """Return the closed loops of a pattern as edges in order, the lowest edge first.
+
+    Bit n of ``joined_faces``: the inside corners of face n hang together.
+    """
     following = {}
     for face in range(6):
-        following |= face_arcs(pattern, face)
+        following |= face_arcs(pattern, face, joined=bool(joined_faces >> face & 1))
     found = []
     while following:
         loop = [min(following)]
@@ -109,22 +118,27 @@ def loops(pattern: int) -> list[tuple[int, ...]]:
     return found
 
 
-def triangulate(loop: tuple[int, ...]) -> list[tuple[int, int, int]]:
-    """Cut a loop into triangles of least total area, without a diagonal inside a cube face."""
+def triangulate(loop: tuple[int, ...]) -> list[tuple[int, int, int]] | None:
+    """Cut a loop into triangles of least total area, without a diagonal inside a cube face.
+
+    None where every way has such a diagonal; no loop of `cube_cases` is like that.
+    """
     n = len(loop)
     best = {(i, i + 1): (0, -1) for i in range(n - 1)}
     for width in range(2, n):
         for i in range(n - width):
             k = i + width
-            if width < n - 1 and loop[k] in _coplanar_edges()[loop[i]]:
+            if width < n - 1 and loop[k] in coplanar_edges()[loop[i]]:
                 continue
             choices = [
-                (best[i, j][0] + best[j, k][0] + _areas()[loop[i], loop[j], loop[k]], j)
+                (best[i, j][0] + best[j, k][0] + areas()[loop[i], loop[j], loop[k]], j)
                 for j in range(i + 1, k)
                 if (i, j) in best and (j, k) in best
             ]
             if choices:
                 best[i, k] = min(choices)
+    if (0, n - 1) not in best:
+        return None
     triangles, todo = [], [(0, n - 1)]
     while todo:
         i, k = todo.pop()
@@ -159,7 +173,7 @@ def cube_cases() -> CubeCases:
 
 
 @cache
-def _coplanar_edges() -> tuple[frozenset[int], ...]:
+def coplanar_edges() -> tuple[frozenset[int], ...]:
     """For each edge, the edges that lie on a face with it."""
     return tuple(
         frozenset(other for face in _FACE_EDGES if edge in face for other in face)
@@ -168,7 +182,7 @@ def _coplanar_edges() -> tuple[frozenset[int], ...]:
 
 
 @cache
-def _areas() -> dict[tuple[int, int, int], int]:
+def areas() -> dict[tuple[int, int, int], int]:
     """Area of the triangle of any three mid-edges, in whatever order.
 
     In integer units of 1e-9, so that sums are exact and ties are ties on every machine.

@@ -56,9 +56,36 @@ def assert_manifold(mesh):
 
 
 def assert_closed(mesh):
-    """Every edge in exactly two faces, in opposite directions; every link one cycle."""
-    assert_manifold(mesh)
-    assert len(open_edges(mesh)) == 0
+    """Every edge in exactly two faces, in opposite directions; every link one cycle; no face twice.
+
+    For millions of faces: `assert_manifold` says the same, but takes several times as long.
+    """
+    n = mesh.n_vertices
+    if n == 0:
+        assert mesh.n_faces == 0
+        return
+    start, end = directed_edges(mesh.faces)
+    assert (start != end).all(), "a face names a vertex twice"
+    assert len(start) % 2 == 0, "an edge is open"
+    key = np.minimum(start, end) * n + np.maximum(start, end)
+    order = np.argsort(key)
+    one, other = order[0::2], order[1::2]
+    assert (key[one] == key[other]).all(), "an edge is open, or used more than twice"
+    assert (key[one[1:]] != key[one[:-1]]).all(), "an edge is used more than twice"
+    assert (start[one] == end[other]).all(), "an edge is used twice in one direction"
+    # Around a vertex: from a side that starts there to its twin, and on to that one's successor
+    turn = np.empty_like(order)
+    turn[one], turn[other] = other, one
+    turn = turn // 3 * 3 + (turn + 1) % 3
+    assert (turn[turn] != np.arange(len(turn))).all(), "a face has a duplicate"
+    first = np.arange(len(turn))  # of all sides reached by that: of 2, then 4, then 8, ...
+    for _ in range(int(np.bincount(start).max()).bit_length()):
+        first, turn = np.minimum(first, first[turn]), turn[turn]
+    n_fans = np.count_nonzero(first == np.arange(len(first)))
+    is_used = np.zeros(n, bool)
+    is_used[mesh.faces] = True
+    assert is_used.all(), "a vertex is unused"
+    assert n_fans == n, "the faces around a vertex form more than one fan"
 
 
 def euler_characteristic(mesh):

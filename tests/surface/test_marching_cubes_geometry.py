@@ -79,6 +79,43 @@ def test_a_torus_keeps_its_hole_and_is_met_to_second_order():
     assert abs(fitted_order(sizes, lost) - 2) <= 0.1
 
 
+def ball_normal(points):
+    away = points - CENTER
+    return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+def torus_normal(points):
+    ring = points * [1, 1, 0]
+    away = points - MAJOR * ring / np.linalg.norm(ring, axis=1, keepdims=True)
+    return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize(("distance", "normal"), [(ball, ball_normal), (torus, torus_normal)])
+def test_normals_of_faces_converge_to_first_order(distance, normal):
+    sizes, mean, worst = [1 / 8, 1 / 16, 1 / 32], [], []
+    for h in sizes:
+        n = round(1.5 / h)
+        mesh = marching_cubes(grid_of(distance, (-n,) * 3, (2 * n + 1,) * 3, h))
+        across = np.cross(*np.diff(mesh.triangles, axis=1).transpose(1, 0, 2))
+        area = np.linalg.norm(across, axis=1)
+        is_wide = area > 1e-9 * h**2  # of slivers at nodes on the surface rounding takes the rest
+        across = across[is_wide] / area[is_wide, None]
+        cosine = (across * normal(mesh.triangles.mean(axis=1)[is_wide])).sum(axis=1)
+        angle = np.arccos(np.clip(cosine, -1, 1))
+        mean.append(np.average(angle, weights=area[is_wide]))
+        worst.append(angle.max())
+    assert abs(fitted_order(sizes, mean) - 1) <= 0.1
+    assert fitted_order(sizes, worst) >= 0.8
+    assert worst[-1] < 0.2
+
+
+def test_where_signs_leave_no_choice_both_promises_give_one_mesh():
+    grid = grid_of(torus, (-13, -13, -5), (27, 27, 11), 1 / 8)
+    one, other = (marching_cubes(grid, topology=t) for t in ("manifold", "trilinear"))
+    assert np.array_equal(one.vertices, other.vertices)
+    assert np.array_equal(one.faces, other.faces)
+
+
 def test_other_levels_of_a_band_are_offset_surfaces():
     h = 1 / 16
     band = band_of(ball, (-3, -3, -3), (6, 6, 6), h)
