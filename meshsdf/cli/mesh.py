@@ -61,8 +61,8 @@ def command(
     console.watch_compilation()
     from ..io import check_input, check_output, read_mesh, read_volume, write_mesh
     from ..mesh.measures import euler_number, is_watertight
-    from ..surface import default_level, marching_cubes, require_faces
     from ..surface import carry as carry_attributes
+    from ..surface import default_level, marching_cubes, require_faces
 
     if (carry is None) != (source is None):
         raise click.UsageError("--carry and --source go together")
