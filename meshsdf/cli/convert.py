@@ -57,7 +57,13 @@ def command(
     console.watch_compilation()
     from ..io import check_input, check_output, read_mesh, write_volume
     from ..mesh.two_set import check
-    from ..sdf import choose_sign, mesh_to_band, mesh_to_grid, resolve_voxel_size
+    from ..sdf import (
+        choose_sign,
+        mesh_to_band,
+        mesh_to_grid,
+        resolve_voxel_size,
+        union_words,
+    )
 
     check_input(mesh, kind="mesh")
     check_output(out, kind="volume", force=force)
@@ -92,8 +98,11 @@ def command(
         n = plural(facts["uncertain_voxels"], "voxel")
         where = "near the membranes of openings: the winding number is within 0.05 of 1/2"
         console.warn(f"{n} {'nearer than that' if choice.by_crossings else where}")
-    seconds = console.timings("load", "check", "bricks", "distance", "far field", "sign", "write")
-    seconds["distance"] += seconds.pop("bricks") + seconds.pop("far field")
+    if facts.get("n_inner_faces"):
+        console.warn(union_words(report, facts["n_inner_faces"]))
+    stages = ("load", "check", "bricks", "union", "distance", "far field", "sign", "write")
+    seconds = console.timings(*stages)
+    seconds["distance"] += sum(seconds.pop(name) for name in ("bricks", "union", "far field"))
     console.result(_words(mesh, out, facts, choice, loaded, seconds["total"]))
     console.json(
         {"input": mesh, "output": out, "bytes": os.path.getsize(out)}

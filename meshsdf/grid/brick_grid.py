@@ -22,6 +22,7 @@ from ..arrays import (
 from ..errors import GridError
 from ..kernels.brick_lookup import read_nodes
 from .brick_index import BRICK, BrickIndex
+from .hermite import Hermite
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +57,11 @@ class NarrowBand:
         mesh: the winding number is within 0.05 of 1/2, so that the side depends on how one thinks
         of the openings as filled. Of a mesh whose cracks were zipped: the node lies so near the
         surface that its side is not proved.
+    hermite : Hermite or None
+        Crossings, normals and features of the mesh, for dual contouring without it.
+    n_inner_faces : int
+        Faces of the mesh that lie inside the union of its overlapping parts, wholly or in part;
+        distances are not measured to those.
     """
 
     index: BrickIndex
@@ -68,6 +74,8 @@ class NarrowBand:
     closest_face: BrickFaces | None = None
     barycentric: BrickBarycentrics | None = None
     uncertain: BrickMasks | None = None
+    hermite: Hermite | None = None
+    n_inner_faces: int = 0
 
     def __post_init__(self) -> None:
         n = self.index.n_bricks
@@ -166,6 +174,8 @@ class NarrowBand:
         }
         if self.uncertain_voxels is not None:
             facts["uncertain_voxels"] = self.uncertain_voxels
+        if self.n_inner_faces:
+            facts["n_inner_faces"] = self.n_inner_faces
         return facts
 
     def value_at(self, ijk: Ijk) -> Values:

@@ -26,6 +26,9 @@ class Grid:
     uncertain_voxels : int or None
         At how many nodes near the surface the side is not certain, as `NarrowBand.uncertain` says;
         None where it is at all of them.
+    n_inner_faces : int
+        Faces of the mesh that lie inside the union of its overlapping parts, wholly or in part;
+        distances are not measured to those.
 
     Raises
     ------
@@ -38,6 +41,7 @@ class Grid:
     origin: Vector3
     sign: str = "parity"
     uncertain_voxels: int | None = None
+    n_inner_faces: int = 0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.voxel_size) and self.voxel_size > 0):
@@ -63,4 +67,6 @@ class Grid:
         }
         if self.uncertain_voxels is not None:
             facts["uncertain_voxels"] = self.uncertain_voxels
+        if self.n_inner_faces:
+            facts["n_inner_faces"] = self.n_inner_faces
         return facts

@@ -6,6 +6,7 @@ bytes. Keys of both kinds, with shape () unless said:
 - ``format``: text, ``meshsdf.narrow_band/2`` or ``meshsdf.grid/1``
 - ``voxel_size``: float64, world units
 - ``sign``: text, how inside was told
+- ``n_inner_faces`` int64: faces of the mesh inside the union of overlapping parts, if there are any
 
 Narrow band, b bricks of 8 x 8 x 8 nodes:
 
@@ -35,6 +36,7 @@ import numpy as np
 from ..errors import GridError, IoError
 from ..grid import BrickIndex, Grid, NarrowBand
 from .atomic import atomic_write, check_output
+from .half import check_half, halved
 from .npy_archive import ZIP_ERRORS, ArchiveReader, ArrayHeader, write_archive
 from .registry import checked_input
 from .volume_checks import check_volume
@@ -59,6 +61,7 @@ _BAND_KEYS = {
     "uncertain": (("<u8",), (_B, 8)),
     "closest_face": (("<i4",), (_B, 8, 8, 8)),
     "barycentric": (("<f4",), (_B, 8, 8, 8, 2)),
+    "n_inner_faces": (("<i8",), ()),
 }
 _GRID_KEYS = {
     "format": ("text", ()),
@@ -67,10 +70,9 @@ _GRID_KEYS = {
     "sign": ("text", ()),
     "values": ((*_FLOATS, "<f8"), (None, None, None)),
     "uncertain_voxels": (("<i8",), ()),
+    "n_inner_faces": (("<i8",), ()),
 }
-_OPTIONAL = {"closest_face", "barycentric", "uncertain", "uncertain_voxels"}
-_LARGEST_HALF = 65504.0
-_SMALLEST_HALF = 2.0**-14  # below this a float16 loses bits
+_OPTIONAL = {"closest_face", "barycentric", "uncertain", "uncertain_voxels", "n_inner_faces"}
 
 
 def write_npz(
@@ -103,10 +105,10 @@ def write_npz(
     except ValueError as error:
         raise IoError(f"the volume cannot be written: {error}", where, "build it anew") from error
     if half:
-        _check_half(volume, where)
+        check_half(volume.values, where)
     arrays = _band_arrays(volume) if isinstance(volume, NarrowBand) else _grid_arrays(volume)
     if half:
-        arrays["values"] = _halved(arrays["values"])
+        arrays["values"] = halved(arrays["values"])
     with atomic_write(path, force) as temporary:
         write_archive(temporary, arrays)
 
@@ -186,6 +188,8 @@ def _band_arrays(band: NarrowBand) -> dict[str, np.ndarray]:
     for name in ("closest_face", "barycentric", "uncertain"):
         if getattr(band, name) is not None:
             arrays[name] = getattr(band, name)
+    if band.n_inner_faces:
+        arrays["n_inner_faces"] = np.array(band.n_inner_faces, np.int64)
     return arrays
 
 
@@ -199,6 +203,8 @@ def _grid_arrays(grid: Grid) -> dict[str, np.ndarray]:
     }
     if grid.uncertain_voxels is not None:
         arrays["uncertain_voxels"] = np.array(grid.uncertain_voxels, np.int64)
+    if grid.n_inner_faces:
+        arrays["n_inner_faces"] = np.array(grid.n_inner_faces, np.int64)
     return arrays
 
 
@@ -215,6 +221,7 @@ def _band(arrays: dict[str, np.ndarray]) -> NarrowBand:
         arrays.get("closest_face"),
         arrays.get("barycentric"),
         arrays.get("uncertain"),
+        n_inner_faces=int(arrays.get("n_inner_faces", 0)),
     )
 
 
@@ -229,6 +236,7 @@ def _grid(arrays: dict[str, np.ndarray]) -> Grid:
         arrays["origin"],
         str(arrays["sign"]),
         None if doubts is None else int(doubts),
+        int(arrays.get("n_inner_faces", 0)),
     )
 
 
@@ -259,21 +267,6 @@ def _check_headers(headers: dict[str, ArrayHeader], kind: str) -> None:
         is_right = header.dtype.kind == "U" if dtypes == "text" else header.dtype.str in dtypes
         if not fits or not is_right:
             raise ValueError(f"{name!r} is {header.dtype.name} of shape {header.shape}")
-
-
-def _halved(values: np.ndarray) -> np.ndarray:
-    """Round to float16; an inner node at distance 0 keeps its sign as the least negative number."""
-    halves = values.astype(np.float16)
-    return np.where((values < 0) & (halves == 0), np.float16(-(2.0**-24)), halves)
-
-
-def _check_half(volume: NarrowBand | Grid, where: str) -> None:
-    finite = np.abs(volume.values[np.isfinite(volume.values)])
-    largest = float(finite.max(initial=0.0))
-    if largest > _LARGEST_HALF or 0 < largest < _SMALLEST_HALF:
-        span = f"{_SMALLEST_HALF:.2g} to {_LARGEST_HALF:g}"
-        what = f"values up to {largest:g} do not fit float16 ({span})"
-        raise IoError(what, where, "write without half, or scale the mesh")
 
 
 def _unreadable(path: Path, reason: str) -> IoError:

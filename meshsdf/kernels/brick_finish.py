@@ -64,11 +64,13 @@ def renumber(coordinates, slot0, root, pages):
 
 @njit(cache=True, nogil=True)
 def closest_in_bricks(
-    coordinates, nearest, active, points, faces, face_ids, closest_face, barycentric
+    coordinates, nearest, active, points, faces, face_ids, weights, closest_face, barycentric
 ):
     """Fill the closest face and the barycentrics of every active node, -1 and 0 elsewhere.
 
     ``nearest`` (b, 512) indexes ``faces``; ``face_ids`` turns that into the mesh's own numbers.
+    ``weights`` (m, 3, 3) are the barycentrics there of the corners of ``faces``, where these are
+    parts of the mesh's faces; else it is empty.
     """
     for b in range(len(coordinates)):
         for node in range(512):
@@ -82,9 +84,15 @@ def closest_in_bricks(
             y = float(8 * coordinates[b, 1] + j)
             z = float(8 * coordinates[b, 2] + k)
             corner0, corner1, corner2 = faces[f, 0], faces[f, 1], faces[f, 2]
-            _, _, second, third = closest_on_triangle(
+            _, first, second, third = closest_on_triangle(
                 x, y, z, points[corner0], points[corner1], points[corner2]
             )
+            if len(weights) > 0:
+                w = weights[f]
+                second, third = (
+                    first * w[0, 1] + second * w[1, 1] + third * w[2, 1],
+                    first * w[0, 2] + second * w[1, 2] + third * w[2, 2],
+                )
             closest_face[b, node] = face_ids[f]
             barycentric[b, node, 0] = second
             barycentric[b, node, 1] = third

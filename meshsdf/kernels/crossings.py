@@ -91,10 +91,10 @@ def resolve_signs(coordinates, crossings, parity, root, pages, inside):
 
     ``coordinates`` (b, 3) are the slab's bricks in lexicographic order, so every column of bricks
     is a run. Gaps between bricks of a column lie on one side as a whole; inner ones are coded in
-    ``pages`` (or ``root``). Returns the number of lines whose crossings
-    do not cancel or disagree within a gap: 0 for a mesh with the two-set property.
+    ``pages`` (or ``root``). Returns the number of lines whose crossings do not cancel or disagree
+    within a gap, 0 for a mesh with the two-set property, and the largest magnitude of a sum.
     """
-    leaks = 0
+    leaks, largest = 0, 0
     carry = np.zeros(64, np.int32)
     for b in range(len(coordinates)):
         x, y, z = coordinates[b, 0], coordinates[b, 1], coordinates[b, 2]
@@ -103,6 +103,7 @@ def resolve_signs(coordinates, crossings, parity, root, pages, inside):
             row = np.uint64(0)
             for k in range(8):
                 total += crossings[b, 8 * line + k]
+                largest = max(largest, abs(total))
                 if (total & 1) if parity else total != 0:
                     row |= np.uint64(1) << np.uint64(k)
             carry[line] = total
@@ -122,4 +123,4 @@ def resolve_signs(coordinates, crossings, parity, root, pages, inside):
                 if (carry[line] & 1) if parity else carry[line] != 0:
                     leaks += 1
                 carry[line] = 0
-    return leaks
+    return leaks, largest

@@ -29,8 +29,9 @@ def _edge_depth(p, q, vp, vq, x):
 
 
 @njit(cache=True, nogil=True)
-def _crossing(points, v, lines, line_ends, px, py, pz):
-    """Return 1 or -1 when the ray up from p leaves or enters through the face, else 0."""
+def face_crossing(points, v, lines, line_ends, px, py):
+    """Where the line along z at (px, py) crosses a face: 1 if it leaves upwards, -1 if it enters,
+    0 if it misses, and the height."""
     y_up, y_down, z_up, z_down, n_up = 0.0, 0.0, 0.0, 0.0, 0
     for e in range(3):
         vp, vq = v[e], v[(e + 1) % 3]
@@ -46,12 +47,10 @@ def _crossing(points, v, lines, line_ends, px, py, pz):
         else:
             y_down, z_down = y, z
     if n_up == 0 or not min(y_up, y_down) <= py < max(y_up, y_down):
-        return 0
+        return 0, 0.0
     share = (py - y_up) / (y_down - y_up)
-    if z_up + share * (z_down - z_up) <= pz:
-        return 0
     # Seen along +z: upward edges below downward ones mean the face looks up
-    return 1 if y_up < y_down else -1
+    return (1 if y_up < y_down else -1), z_up + share * (z_down - z_up)
 
 
 @njit(cache=True, nogil=True)
@@ -87,5 +86,7 @@ def count_above(
                 first = (-2 - child) >> 3
                 for s in range(first, first + ((-2 - child) & 7) + 1):
                     lines = edge_line[s] if len(edge_line) > 0 else no_lines
-                    total += _crossing(points, faces[s], lines, line_ends, px, py, pz)
+                    step, height = face_crossing(points, faces[s], lines, line_ends, px, py)
+                    if height > pz:
+                        total += step
         counts[q] = total

@@ -68,11 +68,16 @@ def _volume(points, a, b, c, d):
 
 
 @njit(cache=True, nogil=True)
-def _passes(points, face, p, q):
-    """The line through p and q passes the closed triangle, seen from p or from q."""
+def _passes(points, face, p, q, has_common):
+    """The line through p and q passes the closed triangle, seen from p or from q.
+
+    With a corner common to both faces it must pass certainly: near that corner all lines do.
+    """
     u = _volume(points, p, q, face[0], face[1])
     v = _volume(points, p, q, face[1], face[2])
     w = _volume(points, p, q, face[2], face[0])
+    if has_common:
+        return min(u, v, w) > 0 or max(u, v, w) < 0
     return min(u, v, w) >= 0 < max(u, v, w) or max(u, v, w) <= 0 > min(u, v, w)
 
 
@@ -88,11 +93,14 @@ def _pierces(points, edges_of, face, place):
     if min(s0, s1, s2) >= 0 or max(s0, s1, s2) <= 0:
         return False
     sides = (s0, s1, s2)
+    has_common = False
+    for e in range(9):
+        has_common |= edges_of[e // 3] == face[e % 3]
     for e in range(3):
         s, t = sides[e], sides[(e + 1) % 3]
         if (s > 0 > t) or (s < 0 < t):
             p, q = edges_of[e], edges_of[(e + 1) % 3]
-            if _passes(points, face, p, q):
+            if _passes(points, face, p, q, has_common):
                 share = s / (s - t)
                 for axis in range(3):
                     place[axis] = (1 - share) * points[p, axis] + share * points[q, axis]

@@ -15,6 +15,7 @@ from .measures import (
     volume,
 )
 from .mesh import Material, Mesh
+from .outer_boundary import OuterBoundary, outer_boundary
 from .primitives import box_mesh, cylinder, icosphere, tetrahedron
 from .self_intersections import SelfIntersections, find_self_intersections
 from .tubes import closed_tube, torus, trefoil_tube
@@ -27,6 +28,7 @@ __all__ = [
     "Hole",
     "Material",
     "Mesh",
+    "OuterBoundary",
     "SelfIntersections",
     "TwoSetReport",
     "area",
@@ -45,6 +47,7 @@ __all__ = [
     "n_components",
     "net_faces",
     "odd_faces",
+    "outer_boundary",
     "residual_edge_lines",
     "tetrahedron",
     "torus",

@@ -3,10 +3,10 @@
 What is counted: pairs in which an edge of one face leads from certainly one side of the other's
 plane to certainly the other side and passes the closed triangle on the way (its rim included, and
 what rounding cannot tell from its rim). Faces that share an edge are never counted, faces that
-share a corner only if they meet elsewhere too. What is not counted: faces that only touch, faces
-in one plane that overlap (duplicates among them), and whatever lies within the rounding of the
-coordinates of such a position. "Certain" means that the sign of a determinant exceeds a bound on
-its rounding error.
+share a corner only if they certainly meet elsewhere too. What is not counted: faces that only
+touch, faces in one plane that overlap (duplicates among them), and whatever lies within the
+rounding of the coordinates of such a position. "Certain" means that the sign of a determinant
+exceeds a bound on its rounding error.
 """
 
 from dataclasses import dataclass

@@ -5,6 +5,7 @@ from .lattice import resolve_voxel_size
 from .mesh_distance import MeshDistance, PointDistances
 from .narrow_band import mesh_to_band
 from .sign import SignChoice, choose_sign
+from .union import union_words
 
 __all__ = [
     "MeshDistance",
@@ -14,4 +15,5 @@ __all__ = [
     "mesh_to_band",
     "mesh_to_grid",
     "resolve_voxel_size",
+    "union_words",
 ]

@@ -4,12 +4,12 @@ A slab is a run of brick columns along x. Slabs share nothing but the page table
 writes its own entries, so they run on all cores and need scratch memory for a few slabs only.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
-from ..arrays import Number
+from ..arrays import Number, Vector3
 from ..grid import BrickIndex, NarrowBand
 from ..grid.brick_index import number_marked
 from ..kernels.band_distance import scan_edges, scan_faces, scan_vertices
@@ -27,7 +27,7 @@ from .slabs import bin_features, items_of
 
 @dataclass
 class BandBuilder:
-    """The state of one conversion; `build` runs it.
+    """The state of one conversion: `prepare`, perhaps `measure_to`, `tell_sides`, `finish`.
 
     Distances are measured to ``placed``, crossings counted with ``closed``: the same mesh, but for
     cracks. ``sign`` is "parity", "winding" (integer crossings) or "unsigned".
@@ -45,13 +45,33 @@ class BandBuilder:
     root: np.ndarray = field(init=False)
     pages: np.ndarray = field(init=False)
 
-    def build(self) -> NarrowBand:
-        """Return the band; ``leaks`` then counts, per slab, lines whose crossings do not cancel."""
+    def prepare(self) -> None:
+        """Find the bricks."""
         self._mark()
         self._number_bricks()
         self._allocate()
+
+    def measure_to(self, part: PlacedMesh, aside: Vector3) -> None:
+        """Measure distances to a part of the mesh, and tell sides ``aside`` voxels from the nodes.
+
+        The bricks stay those of the whole mesh, as crossings are still counted with all of it.
+        """
+        self.placed = part
+        self.closed = replace(self.closed, points=self.closed.points - aside)
+        self._bin_features()
+        self.inside[:] = 0
+
+    def tell_sides(self) -> None:
+        """Find the side of every node.
+
+        ``leaks`` then counts, per slab, lines whose crossings do not cancel, and ``wound`` holds
+        the largest magnitude of a winding number.
+        """
         if self.sign != "unsigned":
             run_pieces(self._sign_slab, len(self.slabs), stage="sign", progress=self.progress)
+
+    def finish(self) -> NarrowBand:
+        """Measure the distances; return the band."""
         run_pieces(self._fill_slab, len(self.slabs), stage="distance", progress=self.progress)
         return self._collect()
 
@@ -88,14 +108,19 @@ class BandBuilder:
         require_memory(n_pages * 16384, self.max_memory, where="mesh_to_band(...): page table")
 
     def _cut_slabs(self) -> None:
-        """Slabs of brick columns, and which faces, edges and vertices reach into each."""
-        points, faces = self.placed.points, self.placed.faces
-        self.features = features = self.placed.features(self.half_width)
+        """Slabs of brick columns."""
+        points = self.placed.points
         low = max(0, int((points[:, 0].min() - self.half_width) // 8))
         high = int((points[:, 0].max() + self.half_width) // 8) + 1
         ranges = even_ranges(high - low, SLABS_PER_THREAD * n_threads())
         self.slabs = [(low + a, low + b) for a, b in ranges]
-        edges = np.array([8.0 * low] + [8.0 * b for _, b in self.slabs])
+        self._bin_features()
+
+    def _bin_features(self) -> None:
+        """Which faces, edges and vertices reach into each slab."""
+        points, faces = self.placed.points, self.placed.faces
+        self.features = features = self.placed.features(self.half_width)
+        edges = np.array([8.0 * self.slabs[0][0]] + [8.0 * b for _, b in self.slabs])
         reach = self.half_width + 1e-3
         kinds = [features.ends, faces, features.corners[:, None]]
         if self.closed is not self.placed:
@@ -154,7 +179,7 @@ class BandBuilder:
         self.active = np.empty((n, 8), np.uint64)
         self.kept = np.empty(n, np.int64)
         self.n_kept = [0] * len(self.slabs)
-        self.leaks = [0] * len(self.slabs)
+        self.leaks, self.wound = [0] * len(self.slabs), [0] * len(self.slabs)
         if self.closest:
             self.closest_face = np.empty((n, 512), np.int32)
             self.barycentric = np.empty((n, 512, 2), np.float32)
@@ -187,6 +212,7 @@ class BandBuilder:
                 self.placed.points,
                 self.placed.faces,
                 self.placed.face_ids,
+                self.placed.weights,
                 self.closest_face[a : a + n],
                 self.barycentric[a : a + n],
             )
@@ -224,10 +250,10 @@ class BandBuilder:
             not parity,
             crossings,
         )
-        leaks += resolve_signs(
+        more, self.wound[s] = resolve_signs(
             self.coordinates[a:b], crossings, parity, self.root, self.pages, self.inside[a:b]
         )
-        self.leaks[s] = leaks
+        self.leaks[s] = leaks + more
 
     def _collect(self) -> NarrowBand:
         """Close the gaps between slabs and number the bricks that are left."""
@@ -256,4 +282,5 @@ class BandBuilder:
             self.sign,
             shaped(self.closest_face[:n]) if self.closest else None,
             self.barycentric[:n].reshape(n, 8, 8, 8, 2) if self.closest else None,
+            n_inner_faces=self.placed.n_inner,
         )

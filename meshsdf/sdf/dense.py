@@ -3,17 +3,17 @@
 import numpy as np
 
 from ..arrays import Number, Vector3
-from ..grid import Grid, NarrowBand
+from ..grid import Grid
 from ..mesh import Mesh
-from ..mesh.two_set import TwoSetReport, check
+from ..mesh.two_set import TwoSetReport
 from ..progress import Progress, silent
 from ..spatial.closest_point import ClosestPoint
 from .far_field import BYTES_PER_FACE, fill_grid
 from .lattice import resolve_voxel_size
 from .memory import require_memory
-from .narrow_band import check_half_width, mesh_to_band
-from .placed_mesh import bounding_faces
-from .sign import SignMethod, choose_sign
+from .narrow_band import check_half_width, measured_band
+from .placed_mesh import mesh_of_parts
+from .sign import SignMethod
 
 
 def mesh_to_grid(
@@ -46,33 +46,22 @@ def mesh_to_grid(
     needed = 4 * float(np.prod(shape)) + BYTES_PER_FACE * mesh.n_faces
     require_memory(needed, max_memory, where=where)
     first, shape = first.astype(np.int64), shape.astype(np.int64)
-    if report is None:
-        report = check(mesh, self_intersections=False)
-    band = mesh_to_band(
+    band, measured = measured_band(
         mesh,
-        resolution=resolution,
-        voxel_size=voxel_size,
+        report,
+        voxel_size=size,
         half_width=half_width,
         sign=sign,
         translation=translation,
-        report=report,
+        closest=False,
         max_memory=max_memory,
         progress=progress,
     )
-    query = ClosestPoint(_bounding_mesh(mesh, band, report))
+    query = ClosestPoint(mesh_of_parts(mesh.welded, measured.face_ids, measured.weights))
     values = fill_grid(band, query, first, shape, progress)
     origin = band.to_world(first[None])[0]
-    return Grid(values, band.voxel_size, origin, band.sign, band.uncertain_voxels)
-
-
-def _bounding_mesh(mesh: Mesh, band: NarrowBand, report: TwoSetReport) -> Mesh:
-    """The faces that the band's distances are measured to."""
-    by_crossings = (
-        band.is_signed and choose_sign(report, band.sign, voxel_size=band.voxel_size).by_crossings
-    )
-    cancel = band.sign if by_crossings else "unsigned"
-    keep = bounding_faces(mesh.welded, cancel=cancel, report=report)
-    return Mesh(mesh.welded.points, mesh.welded.faces[keep])
+    counts = {name: getattr(band, name) for name in ("uncertain_voxels", "n_inner_faces")}
+    return Grid(values, band.voxel_size, origin, band.sign, **counts)
 
 
 def _node_box(

@@ -13,6 +13,7 @@ from ..spatial.closest_point import ClosestPoint
 from .placed_mesh import bounding_faces
 from .point_sides import PointSides
 from .sign import SignMethod, choose_sign
+from .union import aside, may_overlap, union_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class MeshDistance:
     reason : str
         Why, in words for people.
     warnings : tuple of str
-        What the user should know about the sign.
+        What the user should know about the sign, and about faces that are not measured to.
 
     Raises
     ------
@@ -69,6 +70,8 @@ class MeshDistance:
     a closed mesh is exact wherever the magnitude exceeds ``rounding_bound``: the parity, or the
     integer winding number, of the point. For open meshes it is that of the generalised winding
     number against 1/2.
+    Union: as in `mesh_to_band`, overlapping bodies are measured as their union. An overlap of one
+    part with itself is seen if it holds a place beside the middle of a face, of those of a sample.
     Determinism: the result does not depend on the order of the points or on threads.
     Cost: O(m log m) to build; per point O(log m) for the distance and one ray for the sign.
 
@@ -98,9 +101,18 @@ class MeshDistance:
         welded = mesh.welded
         cancel = choice.method if choice.by_crossings else "unsigned"
         keep = bounding_faces(welded, cancel=cancel, report=report)
-        self._faces = np.flatnonzero(keep).astype(np.int32)
+        self._faces, self._weights = np.flatnonzero(keep).astype(np.int32), None
+        self._blur = 0.0
         self._query = ClosestPoint(Mesh(welded.points, welded.faces[keep]))
         self._sides = PointSides(mesh, self._query, choice, report)
+        parts = None
+        if cancel == "winding":
+            parts = self._sides.find_union(self._faces, search=may_overlap(report))
+        if parts is not None:
+            self._faces, self._weights = parts.face_ids, parts.weights
+            self._query = ClosestPoint(Mesh(parts.points, parts.faces))
+            self._blur = float(np.linalg.norm(aside(welded.points)))
+            self.warnings += (union_words(report, parts.n_inner),)
 
     def __call__(self, points: Points, *, progress: Progress = silent) -> PointDistances:
         """Measure (n, 3) points, world units.
@@ -114,12 +126,14 @@ class MeshDistance:
         found = self._query(points, progress=progress)
         distance = found.distance
         np.negative(distance, out=distance, where=self._sides(points, progress))
-        faces = self._faces[found.face_index]
-        return PointDistances(distance, found.point, faces, found.barycentric)
+        faces, weights = self._faces[found.face_index], found.barycentric
+        if self._weights is not None:
+            weights = np.einsum("ni,nij->nj", weights, self._weights[found.face_index])
+        return PointDistances(distance, found.point, faces, weights)
 
     def rounding_bound(self, points: Points) -> Values:
         """(n,) proven bound on the error of the magnitude; the sign is exact beyond it."""
-        return self._query.rounding_bound(points)
+        return self._query.rounding_bound(points) + self._blur
 
 
 def _check_points(points: Points) -> None:

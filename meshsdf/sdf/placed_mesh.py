@@ -5,16 +5,17 @@ their neighbours), and sheets that cancel are dropped too, since nothing changes
 faces in even number for parity, faces that come with their reverse for winding numbers.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Int32
+from jaxtyping import Float64, Int32
 
 from ..arrays import FaceLabels, FaceMask, Faces, Points
 from ..errors import SdfError
 from ..kernels.folds import edges_of_vertices, ends_of_edges, mark_corners, mark_folds
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from ..mesh import (
+    Mesh,
     TwoSetReport,
     degenerate_faces,
     net_faces,
@@ -24,6 +25,7 @@ from ..mesh import (
 from ..mesh.edge_table import EdgeTable, edge_table
 from ..mesh.welded import Welded
 from .lattice import Lattice
+from .union import MeshParts
 
 EDGES_PER_PIECE = 2**15  # at least: less work than that is not worth a thread
 
@@ -52,6 +54,10 @@ class Features:
     corners: Int32[np.ndarray, " c"]
 
 
+def _no_weights() -> np.ndarray:
+    return np.empty((0, 3, 3))
+
+
 @dataclass(frozen=True, eq=False)
 class PlacedMesh:
     """Welded triangles in local index coordinates.
@@ -70,6 +76,11 @@ class PlacedMesh:
         Supporting line of edges that cancel only geometrically, else -1; empty when there are none.
     line_ends : (g, 2) int32
         The two outermost vertices on each supporting line.
+    weights : (m, 3, 3) or (0, 3, 3) float64
+        Barycentrics of the corners on the face of the mesh that each is a part of; empty when all
+        are whole.
+    n_inner : int
+        Faces of the mesh left out, wholly or in part, as they lie inside a union.
     """
 
     points: Points
@@ -78,6 +89,18 @@ class PlacedMesh:
     table: EdgeTable
     edge_line: Int32[np.ndarray, "l 3"]
     line_ends: Int32[np.ndarray, "g 2"]
+    weights: Float64[np.ndarray, "w 3 3"] = field(default_factory=_no_weights)
+    n_inner: int = 0
+
+    @classmethod
+    def of_parts(cls, parts: MeshParts) -> "PlacedMesh":
+        """Parts of faces, in local coordinates; crossings cannot be counted with them."""
+        no_lines = np.empty((0, 3), np.int32), np.empty((0, 2), np.int32)
+        table = edge_table(parts.faces, len(parts.points))
+        return cls(
+            *(parts.points, parts.faces, parts.face_ids, table),
+            *(*no_lines, parts.weights, parts.n_inner),
+        )
 
     def features(self, reach: float) -> Features:
         """Find the edges and vertices that may be closest to a node within ``reach`` voxels."""
@@ -103,6 +126,14 @@ class PlacedMesh:
         mark_corners(points, ends, start, edges, reach, is_corner)
         corners = np.flatnonzero(is_corner).astype(np.int32)
         return Features(ends, order, first, edges, start, corners)
+
+
+def mesh_of_parts(welded: Welded, face_ids: FaceLabels, weights: np.ndarray) -> Mesh:
+    """Return parts of faces as a mesh in world units; see ``weights`` of `PlacedMesh`."""
+    if len(weights) == 0:
+        return Mesh(welded.points, welded.faces[face_ids])
+    corners = np.einsum("fij,fjk->fik", weights, welded.points[welded.faces[face_ids]])
+    return Mesh(corners.reshape(-1, 3), np.arange(corners.size // 3, dtype=np.int32).reshape(-1, 3))
 
 
 def bounding_faces(welded: Welded, *, cancel: str, report: TwoSetReport | None = None) -> FaceMask:

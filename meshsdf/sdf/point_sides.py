@@ -3,10 +3,10 @@
 import numpy as np
 from jaxtyping import Bool, Int32
 
-from ..arrays import Points
+from ..arrays import FaceLabels, Points
 from ..kernels.parallel import even_ranges, run_pieces
 from ..kernels.point_crossings import count_above
-from ..mesh import Mesh, residual_edge_lines
+from ..mesh import Mesh, outer_boundary, residual_edge_lines
 from ..mesh.edge_table import edge_table
 from ..mesh.two_set import TwoSetReport
 from ..mesh.welded import Welded, weld_mesh
@@ -15,6 +15,7 @@ from ..spatial.closest_point import POINTS_PER_PIECE, ClosestPoint, morton_order
 from ..spatial.winding_number import winding_number
 from .placed_mesh import bounding_faces
 from .sign import SignChoice
+from .union import MeshParts, aside, beside_faces, parts_of_union, require_faces
 
 Sides = Bool[np.ndarray, " n"]
 
@@ -56,16 +57,41 @@ class PointSides:
         self._prepare(closed, report)
 
     def _prepare(self, closed: Welded, report: TwoSetReport | None) -> None:
-        faces = closed.faces[bounding_faces(closed, cancel=self.choice.method, report=report)]
+        keep = bounding_faces(closed, cancel=self.choice.method, report=report)
+        self._ids, faces = np.flatnonzero(keep).astype(np.int32), closed.faces[keep]
         tree = self.query
         if report is None:
             tree = ClosestPoint(Mesh(closed.points, faces))
         table = edge_table(faces, len(closed.points))
         lines, self._line_ends = residual_edge_lines(faces, closed.points, table=table)
+        self._closed = closed.points, faces, table, (lines, self._line_ends)
         self._points = closed.points - tree.center
         self._center, self._tree = tree.center, tree.tree
         self._faces = faces[tree.face_of_slot]
         self._lines = lines[tree.face_of_slot] if len(lines) else lines
+
+    def find_union(self, placed_ids: FaceLabels, *, search: bool) -> MeshParts | None:
+        """Find the parts of the mesh that bound the union of its bodies, if some do not.
+
+        Where they do not, the side of a point will be told a hair's breadth beside it.
+
+        Parameters
+        ----------
+        placed_ids : (p,) int32
+            The faces that distances are measured to otherwise.
+        search : bool
+            Whether overlaps are likely; if not, a sample of the faces is looked at first.
+        """
+        points, faces, table, lines = self._closed
+        if not search and np.abs(self.crossings(beside_faces(points, faces))).max() <= 1:
+            return None
+        found = outer_boundary(points, faces, table=table, lines=lines)
+        if found is None:
+            return None
+        require_faces(found)
+        self._center = self._center - aside(self.mesh.welded.points)
+        welded = self.mesh.welded
+        return parts_of_union(found, placed_ids, self._ids, welded.points, welded.faces)
 
     def __call__(self, points: Points, progress: Progress = silent) -> Sides:
         """Return which of (n, 3) finite points lie inside."""

@@ -92,7 +92,7 @@ def test_what_would_not_fit_is_refused_with_the_number_before_the_work(
     def work(*_):
         raise AssertionError("the work has started")
 
-    monkeypatch.setattr("meshsdf.sdf.narrow_band.BandBuilder.build", work)
+    monkeypatch.setattr("meshsdf.sdf.narrow_band.BandBuilder.prepare", work)
     outcome = cli("convert", mesh, tmp_path / "a.npz", *options)
     assert outcome.code == 3
     assert "MemoryLimitError: " in outcome.err

@@ -44,7 +44,8 @@ def test_a_band_comes_back_bit_equal(tmp_path_factory, seed, n_bricks, with_face
         band = NarrowBand(index, empty, masks, 0.1, np.zeros(3), 3.0, "unsigned")
     else:
         band = narrow_band(seed, n_bricks=n_bricks, with_faces=with_faces)
-        band = dataclasses.replace(band, uncertain=band.active // 3 if seed % 2 else None)
+        uncertain = band.active // 3 if seed % 2 else None
+        band = dataclasses.replace(band, uncertain=uncertain, n_inner_faces=seed % 3)
     write_npz(path, band)
     assert_equal(read_npz(path), band)
 
