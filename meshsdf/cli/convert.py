@@ -1,6 +1,7 @@
 """``meshsdf convert``: mesh to volume."""
 
 import os
+from dataclasses import replace
 
 import click
 
@@ -26,6 +27,11 @@ from .options import (
 @click.option("--dense", is_flag=True, help="A full grid, exact at every node.")
 @click.option("--half", is_flag=True, help="Store 16-bit floats.")
 @click.option("--closest", is_flag=True, help="Also store closest faces and barycentrics.")
+@click.option(
+    "--hermite",
+    is_flag=True,
+    help="Also store crossings, normals and features, for mesh --method dual-contouring; NPZ only.",
+)
 @max_memory_option
 @force_option
 @json_option
@@ -39,6 +45,7 @@ def command(
     dense: bool,
     half: bool,
     closest: bool,
+    hermite: bool,
     max_memory: float | None,
     force: bool,
     as_json: bool,
@@ -51,6 +58,8 @@ def command(
         raise click.UsageError("give --resolution or --voxel-size, not both")
     if dense and closest:
         raise click.UsageError("--closest is for narrow bands; leave out --dense")
+    if hermite and (dense or not out.lower().endswith(".npz")):
+        raise click.UsageError("--hermite is for narrow bands in .npz files")
     if voxel_size is None and resolution is None:
         resolution = 128
     console = Console("convert", as_json=as_json)
@@ -64,6 +73,7 @@ def command(
         resolve_voxel_size,
         union_words,
     )
+    from ..surface import sample_hermite
 
     check_input(mesh, kind="mesh")
     check_output(out, kind="volume", force=force)
@@ -86,11 +96,15 @@ def command(
         volume = mesh_to_grid(loaded, **options)
     else:
         volume = mesh_to_band(loaded, closest=closest, **options)
+    if hermite and volume.is_signed:
+        volume = replace(volume, hermite=sample_hermite(loaded, volume, progress=console.progress))
     with console.stage("write"):
         write_volume(out, volume, half=half, force=force)
 
     for warning in choice.warnings:
         console.warn(warning)
+    if hermite and not volume.is_signed:
+        console.warn("no Hermite data: an unsigned band has no crossings")
     if volume.sign != choice.method:
         console.warn("no node is inside, so distances are unsigned")
     facts = volume.facts()

@@ -52,7 +52,7 @@ def command(folder: str, force: bool, as_json: bool) -> int:
     trip = roundtrip(knot, RESOLUTIONS, report=report, progress=console.progress)
     console.result(roundtrip_table(trip), is_last=False)
     rows = [row.to_json() for row in trip.rows]
-    facts = {"rows": rows, "order": trip.order}
+    facts = {"rows": rows, "order": trip.order(trip.methods[0])}
     write_text(out / "roundtrip.json", json.dumps(facts, indent=2), force=force)
     for row in trip.rows:
         write_mesh(out / f"trefoil_{row.resolution:g}.ply", row.surface, force=force)

@@ -11,10 +11,11 @@ from .options import Names, Number, force_option, json_option, path
 @click.argument("out", type=path)
 @click.option(
     "--method",
-    type=click.Choice(["marching-cubes"]),
+    type=click.Choice(["marching-cubes", "dual-contouring"]),
     default="marching-cubes",
     show_default=True,
-    help="How the surface is extracted.",
+    help="How the surface is extracted; dual contouring gives sharp features back where VOLUME was "
+    "made with convert --hermite, or --source names its mesh.",
 )
 @click.option(
     "--level",
@@ -41,7 +42,7 @@ from .options import Names, Number, force_option, json_option, path
     type=Names("colours", "uv"),
     help="Give the mesh what the one of --source has: colours, uv or colours,uv.",
 )
-@click.option("--source", type=path, help="The mesh that VOLUME was made from, for --carry.")
+@click.option("--source", type=path, help="The mesh that VOLUME was made from.")
 @force_option
 @json_option
 def command(
@@ -62,10 +63,21 @@ def command(
     from ..io import check_input, check_output, read_mesh, read_volume, write_mesh
     from ..mesh.measures import euler_number, is_watertight
     from ..surface import carry as carry_attributes
-    from ..surface import default_level, marching_cubes, require_faces
+    from ..surface import (
+        choose_normals,
+        default_level,
+        dual_contouring,
+        marching_cubes,
+        require_faces,
+    )
 
-    if (carry is None) != (source is None):
-        raise click.UsageError("--carry and --source go together")
+    is_dual = method == "dual-contouring"
+    if carry is not None and source is None:
+        raise click.UsageError("--carry needs --source MESH")
+    if source is not None and carry is None and not is_dual:
+        raise click.UsageError("--source is for --carry and --method dual-contouring")
+    if is_dual and topology != "manifold":
+        raise click.UsageError("--topology is for --method marching-cubes")
     check_input(volume, kind="volume")
     if source is not None:
         check_input(source, kind="mesh")
@@ -76,14 +88,22 @@ def command(
         level, warnings = default_level(loaded)
         for warning in warnings:
             console.warn(warning)
-    surface = marching_cubes(
-        loaded, level=level, border=border, topology=topology, progress=console.progress
-    )
+    owner = None
+    if source is not None:
+        owner = read_mesh(source, warn=console.warn)
+    if is_dual:
+        for warning in choose_normals(loaded, owner, level=level).warnings:
+            console.warn(warning)
+        options = {"level": level, "border": border, "progress": console.progress}
+        surface = dual_contouring(loaded, owner, **options)
+    else:
+        surface = marching_cubes(
+            loaded, level=level, border=border, topology=topology, progress=console.progress
+        )
     require_faces(surface, level=level)
     shape = {"is_watertight": is_watertight(surface), "euler_number": euler_number(surface)}
-    if source is not None:
+    if carry is not None:
         with console.stage("carry"):
-            owner = read_mesh(source, warn=console.warn)
             surface = carry_attributes(surface, owner, carry, progress=console.progress)
     with console.stage("write"):
         write_mesh(out, surface, force=force)

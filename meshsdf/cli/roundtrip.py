@@ -5,6 +5,7 @@ import click
 from .console import NO, YES, Console
 from .options import (
     Length,
+    Names,
     PositiveNumber,
     Resolutions,
     half_width_option,
@@ -26,10 +27,10 @@ from .options import (
 )
 @click.option(
     "--method",
-    type=click.Choice(["marching-cubes"]),
-    default="marching-cubes",
-    show_default=True,
-    help="How the surface is extracted.",
+    "methods",
+    type=Names("marching-cubes", "dual-contouring"),
+    default=("marching-cubes",),
+    help="How the surface is extracted; with both, they are compared.  [default: marching-cubes]",
 )
 @half_width_option
 @sign_option
@@ -49,7 +50,7 @@ from .options import (
 def command(
     mesh: str,
     resolutions: tuple[float, ...],
-    method: str,
+    methods: tuple[str, ...],
     half_width: float,
     sign: str,
     max_error: tuple[float, bool] | None,
@@ -78,6 +79,7 @@ def command(
     trip = roundtrip(
         loaded,
         resolutions,
+        methods=methods,
         sign=sign,
         half_width=half_width,
         until=until,
@@ -85,20 +87,22 @@ def command(
         max_memory=max_memory,
         progress=console.progress,
     )
-    rows = trip.rows
-    for warning in [*choice.warnings, *rows[-1].warnings]:
+    last = [trip.last(method) for method in trip.methods]
+    warnings = [warning for row in last for warning in row.warnings]
+    for warning in dict.fromkeys([*choice.warnings, *warnings]):
         console.warn(warning)
-    missed = _missed(rows[-1], max_error, until)
+    missed = [sentence for row in last for sentence in _missed(row, max_error, until)]
     console.result(f"{mesh}: sign by {choice.method} ({choice.reason})\n{roundtrip_table(trip)}")
     for sentence in missed:
         console.say(sentence)
     console.json(
         {
             "input": mesh,
-            "method": method,
+            "method": ",".join(trip.methods),
             "sign": choice.method,
-            "rows": [row.to_json() for row in rows],
-            "order": trip.order,
+            "rows": [row.to_json() for row in trip.rows],
+            "order": trip.order(trip.methods[0]),
+            "orders": {method: trip.order(method) for method in trip.methods},
             "passed": not missed,
             "warnings": console.warnings,
             "seconds": console.timings("load", "check"),
@@ -113,8 +117,8 @@ def _missed(row, max_error: tuple[float, bool] | None, until: float | None) -> l
     if max_error is not None and not row.is_within(*max_error):
         unit = "vox" if max_error[1] else ""
         limit = f"--max-error {max_error[0]:g}{unit}"
-        missed.append(f"at resolution {row.resolution:g} the error may exceed {limit}")
+        missed.append(f"{row.method} at {row.resolution:g}: the error may exceed {limit}")
     if until is not None and not row.is_within(until):
         why = "finer voxels do not help, or do not fit in memory"
-        missed.append(f"--until {until:g} is not reached at {row.resolution:g}: {why}")
+        missed.append(f"{row.method} at {row.resolution:g} does not reach --until {until:g}: {why}")
     return missed

@@ -21,6 +21,10 @@ Narrow band, b bricks of 8 x 8 x 8 nodes:
 - ``uncertain`` (b, 8) uint64: bits of nodes whose side is not certain, if there are such
 - ``closest_face`` (b, 8, 8, 8) int32 and ``barycentric`` (b, 8, 8, 8, 2) float32: if known
 
+- ``hermite_fractions`` (c,), ``hermite_normals`` (c, 3), ``hermite_loops`` (k,) int32,
+  ``hermite_loop_points`` (k, 3), ``hermite_arcs`` (t,) int64, ``hermite_arc_points`` (t, 3), else
+  float64: what dual contouring needs of the mesh, see `grid.hermite`; all of them or none
+
 Grid:
 
 - ``values`` (ni, nj, nk) float32 or float64, or float16; NaN where there are no data
@@ -35,6 +39,7 @@ import numpy as np
 
 from ..errors import GridError, IoError
 from ..grid import BrickIndex, Grid, NarrowBand
+from ..grid.hermite import Hermite
 from .atomic import atomic_write, check_output
 from .half import check_half, halved
 from .npy_archive import ZIP_ERRORS, ArchiveReader, ArrayHeader, write_archive
@@ -63,6 +68,15 @@ _BAND_KEYS = {
     "barycentric": (("<f4",), (_B, 8, 8, 8, 2)),
     "n_inner_faces": (("<i8",), ()),
 }
+_HERMITE_KEYS = {
+    "hermite_fractions": (("<f8",), (None,)),
+    "hermite_normals": (("<f8",), (None, 3)),
+    "hermite_loops": (("<i4",), (None,)),
+    "hermite_loop_points": (("<f8",), (None, 3)),
+    "hermite_arcs": (("<i8",), (None,)),
+    "hermite_arc_points": (("<f8",), (None, 3)),
+}
+_BAND_KEYS |= _HERMITE_KEYS
 _GRID_KEYS = {
     "format": ("text", ()),
     "voxel_size": (("<f8",), ()),
@@ -73,6 +87,7 @@ _GRID_KEYS = {
     "n_inner_faces": (("<i8",), ()),
 }
 _OPTIONAL = {"closest_face", "barycentric", "uncertain", "uncertain_voxels", "n_inner_faces"}
+_OPTIONAL |= _HERMITE_KEYS.keys()
 
 
 def write_npz(
@@ -188,6 +203,8 @@ def _band_arrays(band: NarrowBand) -> dict[str, np.ndarray]:
     for name in ("closest_face", "barycentric", "uncertain"):
         if getattr(band, name) is not None:
             arrays[name] = getattr(band, name)
+    if band.hermite is not None:
+        arrays |= {name: getattr(band.hermite, name[8:]) for name in _HERMITE_KEYS}
     if band.n_inner_faces:
         arrays["n_inner_faces"] = np.array(band.n_inner_faces, np.int64)
     return arrays
@@ -221,8 +238,15 @@ def _band(arrays: dict[str, np.ndarray]) -> NarrowBand:
         arrays.get("closest_face"),
         arrays.get("barycentric"),
         arrays.get("uncertain"),
+        hermite=_hermite(arrays),
         n_inner_faces=int(arrays.get("n_inner_faces", 0)),
     )
+
+
+def _hermite(arrays: dict[str, np.ndarray]) -> Hermite | None:
+    if "hermite_fractions" not in arrays:
+        return None
+    return Hermite(*(arrays[name] for name in _HERMITE_KEYS))
 
 
 def _grid(arrays: dict[str, np.ndarray]) -> Grid:
@@ -253,6 +277,8 @@ def _kind(archive: ArchiveReader) -> str:
 def _check_headers(headers: dict[str, ArrayHeader], kind: str) -> None:
     keys = _BAND_KEYS if kind == BAND else _GRID_KEYS
     missing = keys.keys() - headers.keys() - _OPTIONAL
+    if some := _HERMITE_KEYS.keys() & headers.keys():
+        missing |= _HERMITE_KEYS.keys() - some if kind == BAND else set()
     unknown = headers.keys() - keys.keys()
     if missing or unknown:
         word, names = ("lacks", missing) if missing else ("holds the unknown", unknown)

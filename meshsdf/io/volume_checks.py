@@ -7,6 +7,7 @@ a volume comes out of a file and before it goes into one.
 import numpy as np
 
 from ..grid import BrickIndex, Grid, NarrowBand
+from ..grid.hermite import Hermite
 
 LARGEST_BRICK = 1 << 40
 """Brick coordinates beyond this would overflow 64 bits when turned into nodes and squared."""
@@ -33,8 +34,21 @@ def check_volume(volume: NarrowBand | Grid) -> None:
         array = getattr(volume, name)
         if array is not None and len(array) != n:
             raise ValueError(f"{name} holds {len(array)} bricks, the index {n}")
+    if volume.hermite is not None:
+        _check_hermite(volume.hermite)
     if volume.closest_face is not None and volume.closest_face.min(initial=-1) < -1:
         raise ValueError("closest_face holds a number below -1")
+
+
+def _check_hermite(hermite: Hermite) -> None:
+    for name in ("fractions", "normals", "loop_points", "arc_points"):
+        _check_finite(f"hermite_{name}", getattr(hermite, name))
+    if ((hermite.fractions < 0) | (hermite.fractions > 1)).any():
+        raise ValueError("hermite_fractions holds a number beyond 0 and 1")
+    for name in ("loops", "arcs"):
+        numbers = getattr(hermite, name)
+        if numbers.min(initial=0) < 0 or (np.diff(numbers) <= 0).any():
+            raise ValueError(f"hermite_{name} does not rise from 0 on")
 
 
 def check_index(index: BrickIndex) -> None:

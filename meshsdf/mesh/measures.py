@@ -103,8 +103,14 @@ def n_boundary_loops(mesh: Mesh) -> int:
 
 
 def welded(mesh: Mesh) -> Mesh:
-    """Return the shape of the mesh with equal positions made one vertex, attributes left out."""
-    return Mesh(mesh.welded.points, mesh.welded.faces)
+    """Return the shape of the mesh with equal positions made one vertex, attributes left out.
+
+    Faces that then repeat a corner are left out too: they are edges that shrank to a point, which
+    changes neither the Euler number nor the number of components.
+    """
+    faces = mesh.welded.faces
+    repeats = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    return Mesh(mesh.welded.points, faces[~repeats])
 
 
 def _edges(mesh: Mesh) -> EdgeTable:

@@ -3,6 +3,7 @@
 matplotlib draws without a display; the same input gives the same bytes.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ..mesh import Mesh
 from ..mesh.measures import face_normals
-from .roundtrip import RoundTrip
+from .roundtrip import RoundTrip, RoundTripRow
 
 INK, BLUE, ORANGE, GREY = "#222222", "#0072b2", "#d55e00", "#9a9a9a"  # Okabe and Ito 2008
 LIGHT = np.array([0.35, -0.6, 0.72])
@@ -24,13 +25,10 @@ def draw_errors(trip: RoundTrip, path: Path, *, title: str) -> None:
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     rows = [row for row in trip.rows if row.comparison is not None]
+    for method, color in zip(trip.methods, (BLUE, ORANGE), strict=False):
+        _plot_method(axes, [row for row in rows if row.method == method], color)
+    rows = list({row.voxel_size: row for row in rows}.values())
     sizes = np.array([row.voxel_size for row in rows])
-    lower = np.array([row.comparison.distance.lower for row in rows])
-    upper = np.array([row.comparison.distance.upper for row in rows])
-    mean = np.array([row.comparison.forward.mean for row in rows])
-    axes.fill_between(sizes, lower, upper, color=BLUE, alpha=0.3, linewidth=0)
-    axes.plot(sizes, upper, "o-", color=BLUE, label="largest distance (certified interval)")
-    axes.plot(sizes, mean, "s-", color=ORANGE, label="mean distance, mesh to round trip")
     axes.plot(sizes, sizes, ":", color=GREY, label="one voxel")
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -40,12 +38,28 @@ def draw_errors(trip: RoundTrip, path: Path, *, title: str) -> None:
     axes.minorticks_off()
     axes.set_xlabel("voxel size, world units, and resolution")
     axes.set_ylabel("distance, world units")
-    order = "" if trip.order is None else f": observed order {trip.order:.2f}"
+    orders = [trip.order(method) for method in trip.methods]
+    found = " and ".join(f"{order:.2f}" for order in orders if order is not None)
+    order = f": observed order {found}" if found else ""
     axes.set_title(title + order, color=INK, fontsize=11)
     axes.grid(color="#e4e4e4")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False)
     figure.savefig(path, **PNG_OPTIONS)
+
+
+def _plot_method(axes, rows: Sequence[RoundTripRow], color: str) -> None:
+    """The interval of the largest distance as a band, the mean distance as a dashed line."""
+    if not rows:
+        return
+    sizes = np.array([row.voxel_size for row in rows])
+    lower = np.array([row.comparison.distance.lower for row in rows])
+    upper = np.array([row.comparison.distance.upper for row in rows])
+    mean = np.array([row.comparison.forward.mean for row in rows])
+    method = rows[0].method
+    axes.fill_between(sizes, lower, upper, color=color, alpha=0.3, linewidth=0)
+    axes.plot(sizes, upper, "o-", color=color, label=f"{method}: largest distance (certified)")
+    axes.plot(sizes, mean, "s--", color=color, label=f"{method}: mean distance")
 
 
 def draw_surfaces(meshes: list[tuple[str, Mesh]], path: Path) -> None:

@@ -3,19 +3,24 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from ..arrays import Number, Values
 from ..errors import MemoryLimitError, ReportError
+from ..grid import NarrowBand
 from ..mesh import Mesh
 from ..mesh.two_set import TwoSetReport, check
 from ..progress import Progress, silent
 from ..sdf import mesh_to_band
 from ..sdf.memory import require_memory
 from ..sdf.sign import SignMethod
-from ..surface import default_level, marching_cubes
+from ..surface import default_level, dual_contouring, marching_cubes
 from .compare import Comparison, compare
+
+Method = Literal["marching-cubes", "dual-contouring"]
+METHODS = ("marching-cubes", "dual-contouring")
 
 VOXEL_SHARE = 1e-3
 """The interval of the maximum is narrowed until it is no wider than this part of a voxel."""
@@ -39,6 +44,8 @@ class RoundTripRow:
         World units.
     comparison : Comparison
         The mesh against its round trip; None when nothing came back.
+    method : str
+        How the surface was extracted.
     surface : Mesh
         What came back.
     sign : str
@@ -52,6 +59,7 @@ class RoundTripRow:
     resolution: float
     voxel_size: float
     comparison: Comparison | None
+    method: str
     surface: Mesh
     sign: str
     warnings: tuple[str, ...]
@@ -66,7 +74,12 @@ class RoundTripRow:
 
     def to_json(self) -> dict:
         """Return plain types, as the command prints them."""
-        head = {"resolution": self.resolution, "voxel_size": self.voxel_size, "sign": self.sign}
+        head = {
+            "resolution": self.resolution,
+            "voxel_size": self.voxel_size,
+            "sign": self.sign,
+            "method": self.method,
+        }
         if self.comparison is None:
             body = {"hausdorff": None, "forward": None, "backward": None}
         else:
@@ -81,12 +94,20 @@ class RoundTrip:
     rows: tuple[RoundTripRow, ...]
 
     @property
-    def order(self) -> float | None:
-        """Slope of log error against log voxel size by least squares; None for one row.
+    def methods(self) -> tuple[str, ...]:
+        """The methods of extraction, as asked."""
+        return tuple(dict.fromkeys(row.method for row in self.rows))
+
+    def last(self, method: str) -> RoundTripRow:
+        """Return the finest row of a method."""
+        return [row for row in self.rows if row.method == method][-1]
+
+    def order(self, method: str) -> float | None:
+        """Return the slope of log error against log voxel size by least squares; None for one row.
 
         The error is the largest distance seen: the lower end of each row's interval.
         """
-        rows = [row for row in self.rows if row.comparison is not None]
+        rows = [row for row in self.rows if row.method == method and row.comparison is not None]
         if len({row.voxel_size for row in rows}) < 2:
             return None
         sizes = np.array([row.voxel_size for row in rows])
@@ -100,6 +121,7 @@ def roundtrip(
     mesh: Mesh,
     resolutions: Sequence[Number],
     *,
+    methods: Sequence[Method] = ("marching-cubes",),
     sign: SignMethod = "auto",
     half_width: Number = 3.0,
     until: Number | None = None,
@@ -115,16 +137,18 @@ def roundtrip(
         Any triangles with area.
     resolutions : sequence of float
         Voxels along the longest side, one row each.
+    methods : sequence of {"marching-cubes", "dual-contouring"}
+        How the surface is extracted; with both, each has its rows. Dual contouring sees the mesh.
     sign, half_width, report, max_memory, progress
         As for `mesh_to_band`.
     until : float, optional
-        World units. Double the last resolution until the error is certainly below, stops
-        shrinking, or the next one would not fit in memory.
+        World units. Double the last resolution until each method's error is certainly below,
+        stops shrinking, or the next one would not fit in memory.
 
     Raises
     ------
     ReportError
-        No resolution given.
+        No resolution or no method given.
     SdfError, MemoryLimitError
         The mesh cannot be converted.
 
@@ -135,6 +159,8 @@ def roundtrip(
     """
     if len(resolutions) == 0:
         raise ReportError("no resolution given", "roundtrip(resolutions=...)", "give at least one")
+    if len(methods) == 0:
+        raise ReportError("no method given", "roundtrip(methods=...)", f"give some of {METHODS}")
     if report is None:
         report = check(mesh, self_intersections=False)
     options = {
@@ -144,21 +170,38 @@ def roundtrip(
         "max_memory": max_memory,
         "progress": progress,
     }
-    rows = [_row(mesh, resolution, options) for resolution in resolutions]
-    while until is not None and not rows[-1].is_within(until) and not _is_stuck(rows):
+    rows = [row for n in resolutions for row in _rows(mesh, n, methods, options)]
+    while until is not None:
+        resolution = 2 * rows[-1].resolution
+        left = [method for method in methods if _can_improve(rows, method, until)]
+        if not left:
+            break
         try:
-            rows.append(_row(mesh, 2 * rows[-1].resolution, options))
+            rows += _rows(mesh, resolution, left, options)
         except MemoryLimitError:
             break
     return RoundTrip(tuple(rows))
 
 
-def _row(mesh: Mesh, resolution: Number, options: dict) -> RoundTripRow:
-    marks = [time.perf_counter()]
+def _rows(
+    mesh: Mesh, resolution: Number, methods: Sequence[Method], options: dict
+) -> list[RoundTripRow]:
+    """One row for every method, from one band."""
+    begin = time.perf_counter()
     band = mesh_to_band(mesh, resolution=resolution, **options)
-    marks.append(time.perf_counter())
+    spent = time.perf_counter() - begin
+    return [_row(mesh, float(resolution), band, spent, method, options) for method in methods]
+
+
+def _row(
+    mesh: Mesh, resolution: float, band: NarrowBand, spent: float, method: Method, options: dict
+) -> RoundTripRow:
+    marks = [time.perf_counter()]
     level, warnings = default_level(band)
-    surface = marching_cubes(band, level=level, progress=options["progress"])
+    if method == "marching-cubes":
+        surface = marching_cubes(band, level=level, progress=options["progress"])
+    else:
+        surface = dual_contouring(band, mesh, level=level, progress=options["progress"])
     marks.append(time.perf_counter())
     comparison = None
     needed = BYTES_PER_FACE * (mesh.n_faces + surface.n_faces)
@@ -175,11 +218,23 @@ def _row(mesh: Mesh, resolution: Number, options: dict) -> RoundTripRow:
     else:
         warnings += ("nothing came back: no node is inside, the mesh is thinner than a voxel",)
     marks.append(time.perf_counter())
-    spent = np.round(np.diff(marks), 4).tolist()
-    seconds = dict(zip(("distance", "surface", "compare"), spent, strict=True))
+    parts = [round(part, 4) for part in (spent, *np.diff(marks).tolist())]
     return RoundTripRow(
-        float(resolution), band.voxel_size, comparison, surface, band.sign, warnings, seconds
+        resolution,
+        band.voxel_size,
+        comparison,
+        method,
+        surface,
+        band.sign,
+        warnings,
+        dict(zip(("distance", "surface", "compare"), parts, strict=True)),
     )
+
+
+def _can_improve(rows: Sequence[RoundTripRow], method: str, until: Number) -> bool:
+    """Whether a method's error is not yet below, and finer voxels still help."""
+    own = [row for row in rows if row.method == method]
+    return not own[-1].is_within(until) and not _is_stuck(own)
 
 
 def _is_stuck(rows: Sequence[RoundTripRow]) -> bool:

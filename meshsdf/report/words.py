@@ -4,6 +4,7 @@ from .roundtrip import RoundTrip, RoundTripRow
 
 HEADS = (
     "resolution",
+    "method",
     "voxel",
     "largest (world)",
     "in voxels",
@@ -15,7 +16,7 @@ HEADS = (
     "parts",
     "seconds",
 )
-WIDTHS = (10, 11, 25, 15, 17, 9, 9, 9, 9, 7, 8)
+WIDTHS = (10, 17, 11, 25, 15, 17, 9, 9, 9, 9, 7, 8)
 
 
 def roundtrip_table(trip: RoundTrip) -> str:
@@ -25,15 +26,16 @@ def roundtrip_table(trip: RoundTrip) -> str:
         "".join(f"{cell:>{width}}" for cell, width in zip(_cells(row), WIDTHS, strict=False))
         for row in trip.rows
     ]
-    if trip.order is not None:
-        lines.append(f"observed order of the largest distance: {trip.order:.2f}")
+    orders = [(method, trip.order(method)) for method in trip.methods]
+    if found := [f"{method} {order:.2f}" for method, order in orders if order is not None]:
+        lines.append(f"observed order of the largest distance: {', '.join(found)}")
     return "\n".join(lines)
 
 
 def _cells(row: RoundTripRow) -> tuple[str, ...]:
     found = row.comparison
     if found is None:
-        return f"{row.resolution:g}", f"{row.voxel_size:.4g}", "nothing came back"
+        return f"{row.resolution:g}", row.method, f"{row.voxel_size:.4g}", "nothing came back"
     lower, upper = found.distance.lower, found.distance.upper
     before, after = found.before, found.after
     volume = "-"
@@ -41,6 +43,7 @@ def _cells(row: RoundTripRow) -> tuple[str, ...]:
         volume = f"{100 * (after.volume / before.volume - 1):+.2f}%"
     return (
         f"{row.resolution:g}",
+        row.method,
         f"{row.voxel_size:.4g}",
         f"[{lower:.5g}, {upper:.5g}]",
         f"[{found.in_voxels(lower):.3f}, {found.in_voxels(upper):.3f}]",

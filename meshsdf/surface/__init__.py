@@ -3,6 +3,8 @@
 from .carry import carry
 from .continuation import continue_surface
 from .curves import Curve, Curves
+from .dual_contouring import dual_contouring
+from .hermite import choose_normals, sample_hermite
 from .level import default_level, require_faces
 from .marching_cubes import marching_cubes, singular_cells
 from .marching_slices import marching_cubes_slices
@@ -15,13 +17,16 @@ __all__ = [
     "Curves",
     "MeshPart",
     "carry",
+    "choose_normals",
     "continue_surface",
     "default_level",
+    "dual_contouring",
     "find_seeds",
     "marching_cubes",
     "marching_cubes_slices",
     "marching_squares",
     "marching_squares_rows",
     "require_faces",
+    "sample_hermite",
     "singular_cells",
 ]

@@ -187,7 +187,7 @@ def test_roundtrip_ends_when_memory_does_and_keeps_its_rows(cli, tmp_path):
     assert outcome.code == 1
     assert len(outcome.json["rows"]) >= 1
     assert outcome.json["passed"] is False
-    assert "--until 1e-09 is not reached" in outcome.err
+    assert "does not reach --until 1e-09" in outcome.err
 
 
 def test_roundtrip_ends_when_finer_voxels_do_not_help(cli, tmp_path):

@@ -17,6 +17,7 @@ from meshsdf.mesh.measures import (
     n_boundary_loops,
     n_components,
     volume,
+    welded,
 )
 from meshsdf.mesh.primitives import box_mesh, cylinder, icosphere, tetrahedron
 from meshsdf.mesh.tubes import torus, trefoil_tube
@@ -167,3 +168,13 @@ def test_unused_vertices_count_for_nothing_and_no_faces_measure_zero():
     assert counts == (0, 0, 0)
     assert (area(NO_FACES), volume(NO_FACES)) == (0.0, 0.0)
     assert face_normals(NO_FACES).shape == (0, 3)
+
+
+def test_edges_that_shrank_to_a_point_change_no_count_of_the_welded_shape():
+    ball = icosphere(1.0, subdivisions=1)
+    a, b = ball.faces[0, :2]
+    vertices = ball.vertices.copy()
+    vertices[a] = vertices[b]
+    joined = welded(Mesh(vertices, ball.faces))
+    assert joined.n_faces == ball.n_faces - 2
+    assert (euler_number(joined), n_components(joined), is_watertight(joined)) == (2, 1, True)
