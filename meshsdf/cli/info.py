@@ -67,10 +67,23 @@ def _mesh_words(file: str, facts: dict) -> str:
 def _volume_words(file: str, facts: dict) -> str:
     kind = facts["kind"].replace("_", " ")
     lines = [f"{file}: {kind}, {file_size(os.path.getsize(file))}"]
-    for key, value in facts.items():
-        if key != "kind":
-            lines.append(f"  {key.replace('_', ' ')}: {_plain(value)}")
+    lines += _fact_lines({key: value for key, value in facts.items() if key != "kind"}, "  ")
     return "\n".join(lines)
+
+
+def _fact_lines(facts: dict, indent: str) -> list[str]:
+    """One line per fact; a list of things with facts of their own becomes a list below it."""
+    lines = []
+    for key, value in facts.items():
+        words = f"{indent}{key.replace('_', ' ')}:"
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            lines.append(words)
+            for item in value:
+                first, *others = _fact_lines(item, indent + "    ")
+                lines += [f"{indent}  - {first.strip()}", *others]
+        else:
+            lines.append(f"{words} {_plain(value)}")
+    return lines
 
 
 def _plain(value: object) -> str:

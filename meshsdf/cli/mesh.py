@@ -43,6 +43,7 @@ from .options import Names, Number, force_option, json_option, path
     help="Give the mesh what the one of --source has: colours, uv or colours,uv.",
 )
 @click.option("--source", type=path, help="The mesh that VOLUME was made from.")
+@click.option("--grid", help="Which grid of a .vdb file.  [default: the first level set]")
 @force_option
 @json_option
 def command(
@@ -54,6 +55,7 @@ def command(
     topology: str,
     carry: tuple[str, ...] | None,
     source: str | None,
+    grid: str | None,
     force: bool,
     as_json: bool,
 ) -> int:
@@ -83,7 +85,7 @@ def command(
         check_input(source, kind="mesh")
     check_output(out, kind="mesh", force=force)
     with console.stage("load"):
-        loaded = read_volume(volume)
+        loaded = read_volume(volume, grid=grid, warn=console.warn)
     if level is None:
         level, warnings = default_level(loaded)
         for warning in warnings:

@@ -32,6 +32,8 @@ class Format:
         Module of this package that knows the format.
     reader, writer, prober : str
         Functions of that module; empty if it cannot.
+    has_names : bool
+        Whether a file may hold several things, and the reader takes ``grid`` and ``warn``.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Format:
     reader: str = ""
     writer: str = ""
     prober: str = ""
+    has_names: bool = False
 
     def function(self, name: str) -> Callable:
         """Return a function of the format's module, which is imported now."""
@@ -55,6 +58,7 @@ FORMATS = (
     Format("GLB", (".glb",), "mesh", "gltf", "read_gltf", "write_glb"),
     Format("glTF", (".gltf",), "mesh", "gltf", "read_gltf"),
     Format("NPZ volume", (".npz",), "volume", "npz", "read_npz", "write_npz", "probe_npz"),
+    Format("OpenVDB", (".vdb",), "volume", "vdb", "read_vdb", "write_vdb", "probe_vdb", True),
 )
 
 

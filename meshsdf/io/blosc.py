@@ -1,0 +1,72 @@
+"""Blosc frames, as ``.vdb`` files hold them: opened by a kernel, packed by numcodecs.
+
+OpenVDB packs with LZ4, which `kernels.blosc_frames` opens; frames of other codecs, and all
+packing, need the package numcodecs, which is imported here and nowhere else.
+"""
+
+import numpy as np
+
+from ..arrays import writable_alias
+from ..errors import IoError
+from ..kernels.blosc_frames import DAMAGED, OTHER, open_frames
+from .vdb_stream import UnsuitedError
+
+PIP_LINE = "pip install 'meshsdf[blosc]'"
+
+
+def require_blosc(where: str) -> None:
+    """IoError unless Blosc frames can be made."""
+    try:
+        _codec()
+    except UnsuitedError as error:
+        raise IoError("packing with Blosc needs the package numcodecs", where, error.fix) from None
+
+
+def blosc_encode(data: memoryview, width: int) -> bytes:
+    """Pack values of ``width`` bytes as OpenVDB does: LZ4 on shuffled bytes."""
+    codec = _codec()
+    values = np.frombuffer(data, f"V{width}")  # Blosc takes the size of a value from its type
+    return codec.compress(values, b"lz4", 9, codec.SHUFFLE)
+
+
+def blosc_decode(window: bytes, frames: list[tuple[int, int]], sizes: list[int]) -> bytes:
+    """Open frames, given by where they begin and end; return what they hold, one after another.
+
+    Raises
+    ------
+    ValueError
+        A frame is damaged, or does not hold the bytes that it must.
+    UnsuitedError
+        A frame is not packed with LZ4, and numcodecs is not installed.
+    """
+    if not frames:
+        return b""
+    ends = np.cumsum(sizes)
+    places = np.stack([ends - sizes, ends], axis=1)
+    target = np.empty(int(ends[-1]), np.uint8)
+    states = np.empty(len(frames), np.uint8)
+    source = writable_alias(np.frombuffer(window, np.uint8))
+    scratch = np.empty(max(sizes), np.uint8)
+    open_frames(source, np.array(frames, np.int64), target, places, scratch, states)
+    if (states == DAMAGED).any():
+        worst = int(np.argmax(states == DAMAGED))
+        raise ValueError(f"a Blosc frame for {sizes[worst]} bytes is damaged")
+    for number in np.flatnonzero(states == OTHER).tolist():
+        frame = window[slice(*frames[number])]
+        try:
+            # The kernel has compared the size that the frame claims, so this takes no more
+            data = _codec().decompress(frame)
+        except RuntimeError as error:
+            raise ValueError(f"a Blosc frame is damaged ({error})") from None
+        target[slice(*places[number])] = np.frombuffer(data, np.uint8)
+    return target.tobytes()
+
+
+def _codec():
+    """The package; UnsuitedError if it is not installed."""
+    try:
+        import numcodecs.blosc
+    except ImportError:
+        what = "its values are packed with Blosc, which needs the package numcodecs"
+        raise UnsuitedError(what, PIP_LINE) from None
+    return numcodecs.blosc
