@@ -53,24 +53,26 @@ def place_arcs(
     kinds : LoopKinds
         What became of them.
     """
+    is_taken = np.zeros(4 * len(near.loops.around), np.bool_)
+    is_taken[folded] = True
     ends, _ = find_ends(near.loops, folded)
     middles = crossing_places(near.crossings, ends.ravel()).reshape(-1, 2, 3).mean(axis=1)
     found = [(folded, _settle(near, ends, middles))]
-    keys = np.setdiff1d(_keys(near.loops, kinds.is_curved), folded)
+    keys = np.flatnonzero(_are_keys(near.loops, kinds.is_curved) & ~is_taken)
     ends, _ = find_ends(near.loops, keys)
     middles = points[_pairs(near.loops, keys)].mean(axis=1)
     _, is_off = near.walk(*_as_loops(ends), middles, ALLOWED)
     found.append((keys[is_off], _settle(near, ends[is_off], middles[is_off])))
-    taken = np.concatenate([found[0][0], found[1][0]])
-    keys = np.setdiff1d(_keys(near.loops, kinds.is_near), taken)
+    is_taken[keys[is_off]] = True
+    keys = np.flatnonzero(_are_keys(near.loops, kinds.is_near) & ~is_taken)
     found.append(_bends(near, keys, points, kinds.is_sharp))
     keys, places = (np.concatenate(part) for part in zip(*found, strict=True))
     order = np.argsort(keys)
     return keys[order], places[order]
 
 
-def _keys(loops: Loops, is_wanted: Bool[np.ndarray, " l"]) -> Keys:
-    """Keys of the arcs between two loops of which one is wanted."""
+def _are_keys(loops: Loops, is_wanted: Bool[np.ndarray, " l"]) -> Bool[np.ndarray, " a"]:
+    """Which names are keys of arcs between two loops of which one is wanted."""
     c = len(loops.around)
     is_marked = np.empty(4 * c, np.bool_)
     in_ranges(
@@ -78,7 +80,7 @@ def _keys(loops: Loops, is_wanted: Bool[np.ndarray, " l"]) -> Keys:
         c,
         nodes_per_item=16,
     )
-    return np.flatnonzero(is_marked)
+    return is_marked
 
 
 def _pairs(loops: Loops, keys: Keys) -> Pairs:
@@ -165,8 +167,9 @@ def _strays(
         low = cuts[:, k - 1] if k else np.zeros(len(ends))
         high = np.where(k < n_cuts, cuts[:, min(k, cuts.shape[1] - 1)], 1.0)
         looked_at = (k <= n_cuts) & ~((n_cuts == 0) & is_inner) & ~strays
-        some = rows[looked_at & (np.where(looked_at, high - low, 0.0) > SHORTEST)]
-        middle = (0.5 * (low + high))[some, None]
+        looked = rows[looked_at]  # beyond the last cut there are no numbers
+        some = looked[high[looked] - low[looked] > SHORTEST]
+        middle = 0.5 * (low[some] + high[some])[:, None]
         places = (1.0 - middle) * start[some] + middle * stop[some]
         arcs, chosen = _as_loops(ends[some])
         _, is_off = near.walk(arcs, chosen, places, enough[some])
