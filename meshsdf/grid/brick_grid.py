@@ -171,6 +171,7 @@ class NarrowBand:
             "n_bricks": self.index.n_bricks,
             "sign": self.sign,
             "has_closest_face": self.closest_face is not None,
+            "has_hermite": self.hermite is not None,
         }
         if self.uncertain_voxels is not None:
             facts["uncertain_voxels"] = self.uncertain_voxels

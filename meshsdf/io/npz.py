@@ -49,7 +49,14 @@ from .volume_checks import check_volume
 BAND = "meshsdf.narrow_band/2"
 GRID = "meshsdf.grid/1"
 
-_B = "bricks"  # stands for one number in all the shapes it occurs in
+# Each stands for one number in all the shapes it occurs in: the length of the array named here
+_B, _C, _L, _A = "bricks", "crossings", "loops", "arcs"
+_NAMED_BY = {
+    _B: "coordinates",
+    _C: "hermite_fractions",
+    _L: "hermite_loops",
+    _A: "hermite_arcs",
+}
 _FLOATS = ("<f2", "<f4")
 _BAND_KEYS = {
     "format": ("text", ()),
@@ -69,12 +76,12 @@ _BAND_KEYS = {
     "n_inner_faces": (("<i8",), ()),
 }
 _HERMITE_KEYS = {
-    "hermite_fractions": (("<f8",), (None,)),
-    "hermite_normals": (("<f8",), (None, 3)),
-    "hermite_loops": (("<i4",), (None,)),
-    "hermite_loop_points": (("<f8",), (None, 3)),
-    "hermite_arcs": (("<i8",), (None,)),
-    "hermite_arc_points": (("<f8",), (None, 3)),
+    "hermite_fractions": (("<f8",), (_C,)),
+    "hermite_normals": (("<f8",), (_C, 3)),
+    "hermite_loops": (("<i4",), (_L,)),
+    "hermite_loop_points": (("<f8",), (_L, 3)),
+    "hermite_arcs": (("<i8",), (_A,)),
+    "hermite_arc_points": (("<f8",), (_A, 3)),
 }
 _BAND_KEYS |= _HERMITE_KEYS
 _GRID_KEYS = {
@@ -160,7 +167,8 @@ def probe_npz(path: str | os.PathLike) -> dict:
     """Return what the headers say: ``kind``, ``format``, ``dtype``, ``shape`` and more.
 
     ``kind`` is "narrow_band" or "grid"; both have ``voxel_size`` and ``sign``. A band has
-    ``n_bricks``, ``half_width``, ``translation`` and ``has_closest_face``; a grid has ``origin``.
+    ``n_bricks``, ``half_width``, ``translation``, ``has_closest_face`` and ``has_hermite``; a grid
+    has ``origin``.
     ``shape`` is that of the stored values. The values themselves are neither read nor checked.
     """
     path = checked_input(path)
@@ -180,7 +188,8 @@ def probe_npz(path: str | os.PathLike) -> dict:
     if kind == BAND:
         has_face = "closest_face" in archive.headers
         return {"kind": "narrow_band", "n_bricks": values.shape[0], **facts} | {
-            "has_closest_face": has_face
+            "has_closest_face": has_face,
+            "has_hermite": "hermite_fractions" in archive.headers,
         }
     return {"kind": "grid", **facts}
 
@@ -283,10 +292,10 @@ def _check_headers(headers: dict[str, ArrayHeader], kind: str) -> None:
     if missing or unknown:
         word, names = ("lacks", missing) if missing else ("holds the unknown", unknown)
         raise ValueError(f"it {word} {', '.join(map(repr, sorted(names)))}")
-    n_bricks = headers["coordinates"].shape[:1] if kind == BAND else ()
+    sizes = {side: headers[n].shape[:1] for side, n in _NAMED_BY.items() if n in headers}
     for name, header in headers.items():
         dtypes, shape = keys[name]
-        expected = tuple(n_bricks[0] if n_bricks and side == _B else side for side in shape)
+        expected = tuple((sizes.get(side) or [side])[0] for side in shape)
         fits = len(header.shape) == len(shape) and all(
             want is None or want == side for want, side in zip(expected, header.shape, strict=True)
         )

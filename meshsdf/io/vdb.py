@@ -136,7 +136,24 @@ def write_vdb_grids(
 
     Notes
     -----
-    Memory: some 20 MB beyond the grids, and 64 bytes for every brick.
+    Memory: some 20 MB beyond the grids, however large they are.
+
+    Examples
+    --------
+    A level set and colours in its bricks:
+
+    >>> import tempfile
+    >>> from meshsdf import mesh_to_band
+    >>> from meshsdf.mesh.primitives import box_mesh
+    >>> path = tempfile.mkdtemp() + "/box.vdb"
+    >>> write_vdb(path, mesh_to_band(box_mesh(), voxel_size=0.1))
+    >>> (surface,) = read_vdb_grids(path)
+    >>> black = np.zeros(3, np.float32)
+    >>> colours = np.full((*surface.values.shape, 3), 0.5, np.float32)
+    >>> tint = replace(surface, name="Cd", values=colours, background=black, grid_class="unknown")
+    >>> write_vdb_grids(path, [surface, tint], force=True)
+    >>> [(grid["name"], grid["type"]) for grid in probe_vdb(path)["grids"]]
+    [('surface', 'float'), ('Cd', 'vec3s')]
     """
     where = f"output {path}"
     check_output(path, force)

@@ -186,6 +186,8 @@ def read_grid(reader: VdbReader, header: GridHeader) -> VdbGrid:
     topology = read_topology(reader, layout)
     values, active = read_leaves(reader, topology.slots, layout)
     tiles = (topology.tile_values, topology.tile_active)
+    if len(topology.tile_active) == 0:
+        tiles = (None, None)
     grid = VdbGrid(
         header.name, topology.index, values, active, layout.background, header.matrix,
         header.grid_class, *tiles, header.metadata, layout.is_half,

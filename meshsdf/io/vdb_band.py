@@ -126,9 +126,11 @@ def grid_to_band(grid: VdbGrid, warn: Warn) -> NarrowBand:
             f"{n_odd} tiles of the grid {grid.name!r} hold other values than its background; "
             "of them only the sign is kept"
         )
+    with np.errstate(over="ignore"):  # what does not fit becomes infinite, and is refused so
+        values = filled.values.astype(np.float32, copy=False)
     return NarrowBand(
         filled.index,
-        filled.values.astype(np.float32, copy=False),
+        values,
         filled.active,
         size,
         np.ascontiguousarray(grid.matrix[:3, 3]),

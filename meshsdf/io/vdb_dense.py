@@ -171,7 +171,8 @@ def grid_to_dense(grid: VdbGrid, file_bytes: int) -> Grid:
             "read it with read_vdb_grids, which keeps it sparse",
         )
     only_active = is_ours and grid.grid_class != "fog volume"
-    values = _unpacked(grid, low, shape, only_active=only_active)
+    with np.errstate(over="ignore"):  # what does not fit becomes infinite, and is refused so
+        values = _unpacked(grid, low, shape, only_active=only_active)
     default = "winding" if np.fmin.reduce(values, axis=None, initial=0) < 0 else "unsigned"
     doubts = grid.metadata.get(DOUBTS)
     return Grid(

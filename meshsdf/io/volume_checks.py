@@ -13,6 +13,7 @@ LARGEST_BRICK = 1 << 40
 """Brick coordinates beyond this would overflow 64 bits when turned into nodes and squared."""
 
 _LONGEST_SIGN = 32
+_LONGEST_NORMAL = 1 + 1e-6  # of a component; rounding is far less
 _ROWS_AT_ONCE = 4096
 
 
@@ -45,6 +46,8 @@ def _check_hermite(hermite: Hermite) -> None:
         _check_finite(f"hermite_{name}", getattr(hermite, name))
     if ((hermite.fractions < 0) | (hermite.fractions > 1)).any():
         raise ValueError("hermite_fractions holds a number beyond 0 and 1")
+    if (np.abs(hermite.normals) > _LONGEST_NORMAL).any():
+        raise ValueError("hermite_normals holds a vector longer than 1")
     for name in ("loops", "arcs"):
         numbers = getattr(hermite, name)
         if numbers.min(initial=0) < 0 or (np.diff(numbers) <= 0).any():

@@ -33,7 +33,7 @@ def read_volume(
     if format.has_names:
         return reader(checked_input(path), grid=grid, warn=warn)
     if grid is not None:
-        what = f"a {format.name} holds one volume, without a name"
+        what = f"a file of the format {format.name!r} holds one volume, without a name"
         raise IoError(what, f"read_volume(grid={grid!r})", "leave out the name of the grid")
     return reader(checked_input(path))
 

@@ -111,28 +111,33 @@ def _is_over(surface, f, normal, x, enough):
 
 
 @njit(cache=True, nogil=True)
-def walk_points(surface, loops, normals, chosen, places, enough, begin, end, feet, squares):
-    """Walk to ``places[n]`` from the faces that the crossings of loop ``chosen[n]`` lie on.
+def walk_points(surface, loops, normals, chosen, enough, begin, end, places, is_off):
+    """Move ``places[n]`` onto the surface, as seen from loop ``chosen[n]``, if it is off.
 
-    ``squares[n]`` is the squared distance of the nearest point found, ``feet[n]``, once that is
-    no more than ``enough[n]``; 0 without a foot if one of the faces is near enough at once, and
-    infinite if none is known.
+    That is, if no walk from the faces that the loop's crossings lie on leads to a point nearer
+    than ``enough[n]``, a squared distance; without such faces it stays. ``is_off[n]`` tells.
     """
-    weights, trial, foot = np.empty(3), np.empty(3), np.empty(3)
+    weights, trial, foot, best_foot = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for n in range(begin, end):
         first, last = loops.start[chosen[n]], loops.start[chosen[n] + 1]
-        best = np.inf
-        for s in range(first, last):
+        best, s = np.inf, first
+        while s < last and best > enough[n]:
             f = surface.hits[loops.sides[s]]
             if f >= 0 and _is_over(surface, f, normals[loops.sides[s]], places[n], enough[n]):
                 best = 0.0
-        for s in range(first, last):
+            s += 1
+        s = first
+        while s < last and best > enough[n]:
             f = surface.hits[loops.sides[s]]
-            if f < 0 or best <= enough[n]:
+            s += 1
+            if f < 0:
                 continue
             square = walk(surface, f, places[n], weights, trial, foot)
             if square < best:
                 best = square
                 for k in range(3):
-                    feet[n, k] = foot[k]
-        squares[n] = best
+                    best_foot[k] = foot[k]
+        is_off[n] = enough[n] < best < np.inf
+        if is_off[n]:
+            for k in range(3):
+                places[n, k] = best_foot[k]

@@ -12,6 +12,7 @@ LEAF = 4
 # less than (7 u + 56 u**2) times the same sum of absolute values (Shewchuk 1997,
 # doi:10.1007/PL00009321, the bound A of orient3d); 8 u leaves room for the bound's own rounding.
 ERROR = 8 * 2.0**-53
+BESIDE = 1e-9  # of an edge's length: far above the rounding of a place that can be told
 
 
 @njit(cache=True, nogil=True)
@@ -101,10 +102,16 @@ def _pierces(points, edges_of, face, place):
         if (s > 0 > t) or (s < 0 < t):
             p, q = edges_of[e], edges_of[(e + 1) % 3]
             if _passes(points, face, p, q, has_common):
-                share = s / (s - t)
+                share, within = s / (s - t), True
                 for axis in range(3):
-                    place[axis] = (1 - share) * points[p, axis] + share * points[q, axis]
-                return True
+                    a, b = points[p, axis], points[q, axis]
+                    place[axis] = (1 - share) * a + share * b
+                    # An edge in the plane but for rounding, beside the face, passes it nowhere
+                    x, y, z = points[face[0], axis], points[face[1], axis], points[face[2], axis]
+                    slack = BESIDE * abs(b - a)
+                    within &= min(x, y, z) - slack <= place[axis] <= max(x, y, z) + slack
+                if within:
+                    return True
     return False
 
 

@@ -40,7 +40,83 @@ def dual_contouring(
     border: Border = "open",
     progress: Progress = silent,
 ) -> Mesh:
-    """Extract the surface ``value = level`` with its creases and corners."""
+    """Extract the surface ``value = level`` with its creases and corners.
+
+    Parameters
+    ----------
+    volume : NarrowBand or Grid
+        Values at nodes, smaller inside. A grid needs 2 nodes per axis; NaN there means no data,
+        and a cell with such a corner yields nothing.
+    mesh : Mesh, optional
+        The mesh that the volume was made from. Without it the Hermite data of a band are taken
+        (`sample_hermite`), and without these gradients of the values; `choose_normals` says which.
+    level : float
+        In the unit of the values. For a band it must lie strictly between +-background. Mesh and
+        Hermite data know level 0 alone.
+    clamp : bool
+        Keep every vertex in its cell, so that no two triangles cross. By default vertices may
+        leave their cells for the corner or crease they belong to: nothing else brings a polyhedron
+        back exactly, and what crosses then are slivers beside features.
+    feature_angle : float
+        In degrees: edges of the mesh whose faces turn by more are creases. Shallower ones are met
+        by the quadric alone. Of no effect on stored data and gradients.
+    border : {"open", "cap", "pad"}
+        As for `marching_cubes`; an open surface ends in the same lines.
+    progress : callable
+        Told the stage and the fraction done.
+
+    Returns
+    -------
+    mesh : Mesh
+        Faces counter-clockwise seen from where the values are larger. Without faces if no value
+        lies below the level, or none above.
+
+    Raises
+    ------
+    SurfaceError
+        Arguments out of range, as for `marching_cubes`; a feature angle not in (0, 180]; or Hermite
+        data that belong to another band.
+
+    Notes
+    -----
+    Promise: whatever the values, every edge belongs to two faces, in opposite directions, and the
+    faces around every vertex form one cycle; both hold by index, and up to the open border or to
+    cells without data. With ``clamp`` no two triangles have a point in common but what they share
+    by index, as long as a millionth of a voxel is more than the rounding of coordinates.
+    Accuracy, from a mesh or stored data: where creases are sharper than ``feature_angle`` and
+    all that is not flat (an edge, a corner, another sheet) is two voxels from the next such thing,
+    every face lies in the plane of a face of the mesh, and a polyhedron comes back to rounding.
+    Elsewhere vertices are within 0.05 voxels of the mesh wherever it is near the crossing at all;
+    edges and polygons whose middles are farther get one vertex more. With ``clamp`` features
+    outside the cells that see them are lost. With gradients vertices are estimates, within their
+    cells, and creases come back rounded.
+    Limits: without ``clamp`` triangles may fold over beside features, above all at edges sharper
+    than a right angle. Where bodies overlap, the lines in which they cross are met by the quadric.
+    Cost: time and memory grow with the surface in voxels and with the faces of the mesh.
+    The same input gives the same mesh with any number of threads.
+    Method: a crossing of a lattice edge is that with a face of the mesh, to which signs are
+    consistent. One vertex per loop of crossings: on the crease or at the corner where the regions
+    it sees meet, else where the squared distances to the tangent planes are least; triangles as in
+    `kernels.dual_faces` and `kernels.cell_clamp`.
+
+    References
+    ----------
+    T. Ju, F. Losasso, S. Schaefer and J. Warren, "Dual contouring of Hermite data", 2002,
+    doi:10.1145/566654.566586.
+    G. M. Nielson, "Dual marching cubes", 2004, doi:10.1109/VISUAL.2004.28.
+    S. Schaefer, T. Ju and J. Warren, "Manifold dual contouring", 2007,
+    doi:10.1109/TVCG.2007.1012.
+    T. Ju and T. Udeshi, "Intersection-free contouring on an octree grid", 2006.
+
+    Examples
+    --------
+    >>> from meshsdf.mesh.primitives import box_mesh
+    >>> i, j, k = np.indices((8, 8, 8)) - 3.5
+    >>> cube = Grid(np.maximum(np.maximum(abs(i), abs(j)), abs(k)) - 2.25, 1.0, np.full(3, -3.5))
+    >>> surface = dual_contouring(cube, box_mesh((4.5, 4.5, 4.5)))
+    >>> surface.vertices.max(axis=0)
+    array([2.25, 2.25, 2.25])
+    """
     _check(volume, level, feature_angle, border)
     level = float(level)
     toward_infinity = 0.0 if border == "cap" else 0.5

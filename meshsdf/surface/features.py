@@ -6,9 +6,9 @@ cut into triangles), and along a crease a strip of loops sees both sides; their 
 there. As every polygon lies around one crossing, whose label all its loops see, a polygon of a
 flat region then has all its vertices in that region's plane.
 
-Where a loop sees one region alone, the quadric's point is kept if it is near the mesh, and pulled
-there if not, as in a fillet narrower than a cell. Beside an inner corner of a flat region it may
-lie in the plane but off the region; then it moves to the rim.
+Elsewhere the quadric's point is kept if it is near the mesh, and pulled there if not, as in a
+fillet narrower than a cell. Beside an inner corner of a flat region it may lie in the plane but
+off the region; then it moves to the rim.
 """
 
 from collections.abc import Callable
@@ -88,7 +88,7 @@ def place_loops(
     chosen = np.flatnonzero(is_marked)
     feet, is_found = _snap(near, chosen, points[chosen])
     points[chosen], is_sharp[chosen] = feet, is_found
-    chosen = np.flatnonzero(is_curved & ~is_sharp)
+    chosen = np.flatnonzero(~is_sharp)
     points[chosen], is_moved[chosen] = near.walk(near.loops, chosen, points[chosen], ALLOWED)
     is_near = _neighbours(near.loops.around, is_sharp)
     chosen = np.flatnonzero(is_near & ~is_curved & ~is_marked)

@@ -103,17 +103,16 @@ class NearFeatures:
         Where a place is near, and where no face is known, it is returned as it is.
         """
         n = len(places)
-        feet, squares, limits = places.copy(), np.empty(n), np.full(n, enough, np.float64) ** 2
+        feet, is_off = places.copy(), np.empty(n, np.bool_)
+        limits = np.full(n, enough, np.float64) ** 2
 
         def work(begin: int, end: int) -> None:
             walk_points(
-                self.surface, loops, self.crossings.normals, chosen, places, limits, begin, end,
-                feet, squares,
+                self.surface, loops, self.crossings.normals, chosen, limits, begin, end,
+                feet, is_off,
             )  # fmt: skip
 
         in_ranges(work, n, nodes_per_item=NODES_PER_SEARCH)
-        is_off = (squares > limits) & (squares < np.inf)
-        feet[~is_off] = places[~is_off]
         return feet, is_off
 
     def cuts(
@@ -121,7 +120,7 @@ class NearFeatures:
     ) -> tuple[Float64[np.ndarray, "n 32"], Int32[np.ndarray, " n"]]:
         """Where lines from start to stop meet the creases of their region; `cut_chords`."""
         n = len(ends)
-        cuts, n_cuts = np.empty((n, MOST_CUTS)), np.empty(n, np.int32)
+        cuts, n_cuts = np.zeros((n, MOST_CUTS)), np.empty(n, np.int32)
         labels, normals = self.labels[ends[:, 0]], self.crossings.normals[ends[:, 0]]
 
         def cut(begin: int, end: int) -> None:

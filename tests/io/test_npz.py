@@ -121,6 +121,7 @@ def test_the_header_alone_tells_what_is_in_the_file(tmp_path):
         "shape": list(band.values.shape),
         "dtype": "float32",
         "has_closest_face": True,
+        "has_hermite": False,
     }
     write_npz(tmp_path / "g.npz", Grid(np.zeros((2, 3, 4)), 0.5, np.ones(3)))
     facts = probe_npz(tmp_path / "g.npz")
@@ -300,6 +301,55 @@ def changed(array, place, value):
     array = array.copy()
     array[place] = value
     return array
+
+
+def hermite_arrays(**changes):
+    """The arrays of a band whose Hermite data say five crossings, two loops and one arc."""
+    random = np.random.default_rng(8)
+    arrays = {
+        "hermite_fractions": random.random(5),
+        "hermite_normals": random.uniform(-0.5, 0.5, (5, 3)),
+        "hermite_loops": np.array([3, 7], np.int32),
+        "hermite_loop_points": random.normal(size=(2, 3)),
+        "hermite_arcs": np.array([6]),
+        "hermite_arc_points": random.normal(size=(1, 3)),
+    }
+    arrays = band_arrays(**(arrays | changes))
+    return {name: array for name, array in arrays.items() if array is not None}
+
+
+def test_hermite_data_come_back_bit_equal_and_files_without_them_have_none(tmp_path):
+    path = tmp_path / "a.npz"
+    path.write_bytes(archive_of(hermite_arrays()))
+    band = read_npz(path)
+    for name in dataclasses.asdict(band.hermite):
+        assert_array_equal(getattr(band.hermite, name), hermite_arrays()[f"hermite_{name}"])
+    write_npz(tmp_path / "b.npz", band)
+    assert_equal(read_npz(tmp_path / "b.npz"), band)
+    assert probe_npz(tmp_path / "b.npz")["has_hermite"] is True
+    path.write_bytes(archive_of(band_arrays()))
+    assert read_npz(path).hermite is None
+
+
+def test_hermite_data_that_cannot_be_are_refused(tmp_path):
+    cases = [
+        ({"hermite_arcs": None}, "lacks 'hermite_arcs'"),
+        ({"hermite_fractions": None}, "lacks 'hermite_fractions'"),
+        ({"hermite_normals": np.zeros((4, 3))}, r"'hermite_normals' is float64 of shape \(4, 3\)"),
+        ({"hermite_loops": np.array([3], np.int32)}, r"'hermite_loop_points' is .* \(2, 3\)"),
+        ({"hermite_arc_points": np.zeros((2, 3))}, r"'hermite_arc_points' is .* \(2, 3\)"),
+        ({"hermite_normals": np.zeros((5, 2))}, r"float64 of shape \(5, 2\)"),
+        ({"hermite_normals": np.zeros((5, 3), np.float32)}, "'hermite_normals' is float32"),
+        ({"hermite_fractions": np.array([0, 0.5, 1, 1.01, 0])}, "beyond 0 and 1"),
+        ({"hermite_fractions": np.array([0, np.nan, 1, 1, 0])}, "1 of the numbers in hermite_frac"),
+        ({"hermite_normals": np.full((5, 3), 2.0)}, "longer than 1"),
+        ({"hermite_loop_points": np.full((2, 3), np.inf)}, "6 of the numbers in hermite_loop_p"),
+        ({"hermite_loops": np.array([7, 3], np.int32)}, "hermite_loops does not rise"),
+        ({"hermite_loops": np.array([-1, 3], np.int32)}, "hermite_loops does not rise"),
+        ({"hermite_arcs": np.array([-6])}, "hermite_arcs does not rise"),
+    ]
+    for change, words in cases:
+        refuse(tmp_path, hermite_arrays(**change), words)
 
 
 def test_page_tables_that_would_lead_a_loop_astray_are_refused(tmp_path):

@@ -12,6 +12,7 @@ from numpy.testing import assert_array_equal
 
 from meshsdf.errors import IoError
 from meshsdf.grid import BrickIndex, Grid, NarrowBand
+from meshsdf.grid.hermite import Hermite
 from meshsdf.io import read_volume, write_volume
 from meshsdf.io.half import halved
 from meshsdf.io.vdb import probe_vdb, read_vdb, read_vdb_grids, write_vdb, write_vdb_grids
@@ -282,6 +283,11 @@ def test_float64_is_rounded_and_what_does_not_fit_is_refused(tmp_path):
         write_vdb(tmp_path / "b.vdb", fog, grid_class="fog volume")
     with pytest.raises(IoError, match="a narrow band is a level set"):
         write_vdb(tmp_path / "b.vdb", narrow_band(0), grid_class="fog volume")
+    none, points = np.empty(0), np.empty((0, 3))
+    arcs, loops = np.empty(0, np.int64), np.empty(0, np.int32)
+    data = Hermite(none, points, loops, points, arcs, points)
+    with pytest.raises(IoError, match="crossings and normals have no place"):
+        write_vdb(tmp_path / "b.vdb", dataclasses.replace(narrow_band(0), hermite=data))
     assert not (tmp_path / "b.vdb").exists()
 
 
@@ -345,6 +351,19 @@ def test_the_half_width_of_foreign_level_sets_is_a_round_number_if_that_is_exact
     write_vdb_grids(tmp_path / "a.vdb", [grid], force=True)
     band = read_vdb(tmp_path / "a.vdb")
     assert (band.half_width, band.sign) == (3.0, "winding")
+
+
+def test_a_level_set_of_doubles_is_rounded_unless_it_does_not_fit(tmp_path):
+    index = BrickIndex.from_coordinates(np.array([[0, 0, 0]]))
+    values = np.random.default_rng(0).normal(size=(1, 8, 8, 8))
+    grid = dataclasses.replace(foreign(index, values), background=np.array(1.5))
+    write_vdb_grids(tmp_path / "a.vdb", [grid])
+    assert_array_equal(read_vdb(tmp_path / "a.vdb").values, values.astype(np.float32))
+    for kind in ("level set", "fog volume"):
+        huge = dataclasses.replace(grid, values=values * 1e300, grid_class=kind)
+        write_vdb_grids(tmp_path / "a.vdb", [huge], force=True)
+        with pytest.raises(IoError, match="infinite"):
+            read_vdb(tmp_path / "a.vdb")
 
 
 def test_the_first_level_set_is_read_unless_another_grid_is_asked_for(tmp_path):

@@ -1,6 +1,7 @@
 """meshsdf.kernels.parallel: every piece once, the first exception out, Ctrl-C at once."""
 
 import threading
+import time
 from itertools import pairwise
 
 import pytest
@@ -22,12 +23,15 @@ def test_every_piece_runs_once_and_progress_ends_at_one(monkeypatch, threads):
 @pytest.mark.parametrize("threads", [1, 3])
 def test_the_first_exception_comes_out_and_stops_the_rest(monkeypatch, threads):
     monkeypatch.setattr(parallel, "n_threads", lambda: threads)
-    begun = []
+    begun, has_failed = [], threading.Event()
 
     def work(piece: int) -> None:
         begun.append(piece)
         if piece == 0:
+            has_failed.set()
             raise ValueError("piece 0")
+        has_failed.wait(60)
+        time.sleep(0.01)  # lets the caller see the failure before a thousand pieces are over
 
     with pytest.raises(ValueError, match="piece 0"):
         run_pieces(work, 1000)
