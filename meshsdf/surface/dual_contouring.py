@@ -58,8 +58,9 @@ def dual_contouring(
         leave their cells for the corner or crease they belong to: nothing else brings a polyhedron
         back exactly, and what crosses then are slivers beside features.
     feature_angle : float
-        In degrees: edges of the mesh whose faces turn by more are creases. Shallower ones are met
-        by the quadric alone. Of no effect on stored data and gradients.
+        In degrees: edges of the mesh whose faces turn by more are creases, and all edges of flats
+        at least a voxel wide. Other edges are met by the quadric alone. Of no effect on stored
+        data and gradients.
     border : {"open", "cap", "pad"}
         As for `marching_cubes`; an open surface ends in the same lines.
     progress : callable
@@ -83,9 +84,10 @@ def dual_contouring(
     faces around every vertex form one cycle; both hold by index, and up to the open border or to
     cells without data. With ``clamp`` no two triangles have a point in common but what they share
     by index, as long as a millionth of a voxel is more than the rounding of coordinates.
-    Accuracy, from a mesh or stored data: where creases are sharper than ``feature_angle`` and
-    all that is not flat (an edge, a corner, another sheet) is two voxels from the next such thing,
-    every face lies in the plane of a face of the mesh, and a polyhedron comes back to rounding.
+    Accuracy, from a mesh or stored data: where all that is not flat (an edge, a corner, another
+    sheet) is two voxels from the next such thing, every face lies in the plane of a face of the
+    mesh, and a polyhedron comes back to rounding, or to 1e-7 voxels where faces turn by less than
+    1e-7, as those of one plane do after rounding to float32.
     Elsewhere vertices are within 0.05 voxels of the mesh wherever it is near the crossing at all;
     edges and polygons whose middles are farther get one vertex more. With ``clamp`` features
     outside the cells that see them are lost. With gradients vertices are estimates, within their

@@ -7,7 +7,7 @@ from jaxtyping import Float64, Int32
 
 from ..arrays import FaceLabels, Faces, Number, Points
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
-from ..kernels.regions import label_regions, unit_normals
+from ..kernels.regions import label_flats, label_regions, mark_wide, unit_normals
 from ..mesh import Mesh, check, degenerate_faces, net_faces, odd_faces, residual_edge_lines
 from ..mesh.edge_chain import residual_lines
 from ..mesh.edge_table import EdgeTable, edge_table
@@ -15,6 +15,12 @@ from ..mesh.welded import weld_mesh
 
 ZIP = 1e-3
 """In voxels: cracks narrower than this are closed first, so that lattice lines find no way out."""
+
+FLAT_SINE = 1e-7
+"""Faces that turn by less belong to one flat."""
+
+WIDE = 1.0
+"""In voxels: the edges of flats at least as wide are creases, however little the faces turn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +69,9 @@ class Regions:
 def cut_regions(mesh: Mesh, *, sign: str, feature_angle: Number, voxel_size: Number) -> Regions:
     """Cut a mesh along edges whose faces turn by more than ``feature_angle`` degrees.
 
+    Flats (faces in one plane) at least a voxel wide are regions of their own: only where faces are
+    smaller than voxels is a mesh of small turns taken for a smooth surface.
+
     ``sign`` says how inside was told, and thereby which sheets cancel: those in even number for
     "parity", those that come with their reverse for "winding".
     """
@@ -83,13 +92,14 @@ def cut_regions(mesh: Mesh, *, sign: str, feature_angle: Number, voxel_size: Num
     pieces = even_ranges(len(faces), n_threads())
     run_pieces(lambda p: unit_normals(points, faces, *pieces[p], normals), len(pieces))
     cosine = float(np.cos(np.radians(feature_angle)))
-    groups = _groups(table, points)
-    links, seams = _judge(groups, normals, cosine)
     first = np.concatenate([[0], np.cumsum(table.n_uses)]).astype(np.int32)
-    labels, is_crease = np.empty(len(faces), np.int32), np.empty(len(first) - 1, np.bool_)
-    label_regions(
-        table.half_edges, first, table.net_uses, normals, cosine, links, labels, is_crease
-    )
+    flats, labels = np.empty((2, len(faces)), np.int32)
+    is_wide, is_crease = np.empty(len(faces), np.bool_), np.empty(len(first) - 1, np.bool_)
+    turns = table.half_edges, first, table.net_uses, normals
+    label_flats(*turns, FLAT_SINE, flats)
+    mark_wide(points, faces, *turns[:2], WIDE * voxel_size, flats, np.empty(len(faces)), is_wide)
+    links, seams = _judge(_groups(table, points), normals, cosine, is_wide)
+    label_regions(*turns, cosine, links, flats, is_wide, labels, is_crease)
     at = first[:-1][is_crease]
     both = np.stack([table.half_edges[at] // 3, table.half_edges[at + 1] // 3], axis=1)
     creases = np.concatenate([table.edges[is_crease], seams[:, :2]])
@@ -124,13 +134,19 @@ def _groups(table: EdgeTable, points: Points) -> list[tuple[np.ndarray, np.ndarr
 
 
 def _judge(
-    groups: list[tuple[np.ndarray, np.ndarray]], normals: np.ndarray, cosine: float
+    groups: list[tuple[np.ndarray, np.ndarray]],
+    normals: np.ndarray,
+    cosine: float,
+    is_wide: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of faces to join, and edges that part two faces: (vertex, vertex, face, face)."""
     links, seams = [np.empty((0, 2), np.int32)], [np.empty((0, 4), np.int32)]
     for edges, faces in groups:
         a, b = np.triu_indices(len(faces), 1)
-        is_smooth = np.abs((normals[faces[a]] * normals[faces[b]]).sum(axis=1)) >= cosine
+        cosines = np.abs((normals[faces[a]] * normals[faces[b]]).sum(axis=1))
+        sines = np.linalg.norm(np.cross(normals[faces[a]], normals[faces[b]]), axis=1)
+        is_smooth = (cosines >= cosine) & ~is_wide[faces[a]] & ~is_wide[faces[b]]
+        is_smooth |= sines <= FLAT_SINE
         links.append(np.stack([faces[a], faces[b]], axis=1)[is_smooth])
         apart = np.stack([faces[a], faces[b]], axis=1)[~is_smooth]
         seams.append(np.hstack([edges.repeat(len(apart), 0), np.tile(apart, (len(edges), 1))]))

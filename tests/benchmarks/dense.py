@@ -16,7 +16,7 @@ from meshsdf import mesh_to_grid, read_mesh
 from .alternate import alternate, machine, median, models
 from .rivals import compare_answers, rivals
 
-REPEATS = 3
+REPEATS = 5
 
 
 def main(resolutions: list[str]) -> None:

@@ -9,6 +9,7 @@ import manifold3d
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from meshsdf import Grid, Mesh, compare, dual_contouring, marching_cubes, mesh_to_band, read_mesh
 from meshsdf.errors import SurfaceError
@@ -153,6 +154,49 @@ def test_fandisk_loses_a_tenth_of_what_marching_cubes_loses():
     sharp = compare(mesh, dual_contouring(band, mesh), tolerance=tolerance).distance
     blunt = compare(mesh, marching_cubes(band), tolerance=tolerance).distance
     assert sharp.upper < 0.1 * blunt.lower
+
+
+def feature_samples(mesh, step):
+    """Places along the edges at which faces turn, the ends of these edges, and where these are."""
+    solid = trimesh.Trimesh(mesh.welded.points, mesh.welded.faces, process=False)
+    normals = solid.face_normals[solid.face_adjacency]
+    turns = np.linalg.norm(np.cross(normals[:, 0], normals[:, 1]), axis=1) > 1e-6
+    ends = solid.face_adjacency_edges[turns]
+    start, along = solid.vertices[ends[:, 0]], np.diff(solid.vertices[ends], axis=1)[:, 0]
+    n = np.ceil(np.linalg.norm(along, axis=1) / step).astype(int) + 1
+    edge = np.repeat(np.arange(len(ends)), n)
+    share = (np.arange(len(edge)) - np.repeat(np.cumsum(n) - n, n)) / (n[edge] - 1)
+    return start[edge] + share[:, None] * along[edge], ends[edge], solid.vertices
+
+
+def has_close_features(near, places, ends, vertices, apart):
+    """Whether two of the places near lie on different features, less than ``apart`` apart."""
+    a, b = np.triu_indices(len(near), 1)
+    a, b = np.array(near)[a], np.array(near)[b]
+    close = np.linalg.norm(places[a] - places[b], axis=1) < apart
+    a, b = a[close & (ends[a] != ends[b]).any(axis=1)], b[close & (ends[a] != ends[b]).any(axis=1)]
+    # Edges that meet are near each other there; that is one feature, a corner
+    for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        away = np.linalg.norm(places[a] - vertices[ends[a, i]], axis=1) > apart
+        kept = (ends[a, i] != ends[b, j]) | away
+        a, b = a[kept], b[kept]
+    return len(a) > 0
+
+
+@needs_models
+def test_a_pocket_comes_back_exactly_where_features_are_two_voxels_apart():
+    mesh = read_mesh(Path(MODELS) / "octagonal_pocket.stl")
+    band = mesh_to_band(mesh, resolution=200)
+    h, exact = band.voxel_size, 1e-9 * mesh.box.diagonal
+    surface = dual_contouring(band, mesh)
+    points = np.concatenate([surface.vertices, surface.triangles.mean(axis=1)])
+    square, *_ = igl.point_mesh_squared_distance(points, mesh.vertices.copy(), mesh.faces.copy())
+    off = points[np.sqrt(square) > exact]
+    assert len(off) < 0.03 * len(points)
+    places, ends, vertices = feature_samples(mesh, 0.5 * h)
+    for near in cKDTree(places).query_ball_point(off[:: len(off) // 500], 3 * h):
+        assert has_close_features(near, places, ends, vertices, 2.0 * h)
+    assert largest(mesh, surface) < 0.2 * h
 
 
 @needs_models
