@@ -4,14 +4,14 @@ import numpy as np
 from jaxtyping import Bool, Int32
 
 from ..arrays import FaceLabels, Points
-from ..kernels.parallel import even_ranges, run_pieces
+from ..kernels.parallel import run_pieces
 from ..kernels.point_crossings import count_above
 from ..mesh import Mesh, outer_boundary, residual_edge_lines
 from ..mesh.edge_table import edge_table
 from ..mesh.two_set import TwoSetReport
 from ..mesh.welded import Welded, weld_mesh
 from ..progress import Progress, silent
-from ..spatial.closest_point import POINTS_PER_PIECE, ClosestPoint, morton_order
+from ..spatial.closest_point import ClosestPoint, morton_order, point_ranges
 from ..spatial.winding_number import winding_number
 from .placed_mesh import bounding_faces
 from .sign import SignChoice
@@ -107,7 +107,7 @@ class PointSides:
         centered = points - self._center
         sequence = morton_order(centered)
         counts = np.empty(len(points), np.int32)
-        pieces = even_ranges(len(points), len(points) // POINTS_PER_PIECE + 1)
+        pieces = point_ranges(len(points))
 
         def work(piece: int) -> None:
             count_above(

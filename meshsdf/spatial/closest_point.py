@@ -20,7 +20,7 @@ from ..kernels.bvh import (
     morton_codes,
     triangle_boxes,
 )
-from ..kernels.parallel import even_ranges, run_pieces
+from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from ..kernels.point_triangle import FRAME_SIZE, build_frames
 from ..mesh import Mesh
 from ..progress import Progress, silent
@@ -30,6 +30,7 @@ Seeds = Int32[np.ndarray, " seeds"]  # one per point, or none at all
 UNIT_ROUNDOFF = 2.0**-53
 ROUNDING = 64 * UNIT_ROUNDOFF  # times (|p - center| + radius of the mesh); see ClosestPoint
 POINTS_PER_PIECE = 16384  # about 10 ms: often enough for progress and Ctrl-C
+FEWEST_PER_PIECE = 512  # fewer are not worth a thread
 LARGEST = 1e30  # of a coordinate, world units
 MORTON_FROM = 256  # fewer points are asked in the order they come
 
@@ -120,7 +121,7 @@ class ClosestPoint:
         self.slot_of_face = np.empty(m, np.int32)
         self.slot_of_face[self.face_of_slot] = np.arange(m, dtype=np.int32)
         self.frames = np.empty((m, FRAME_SIZE))
-        pieces = even_ranges(m, m // POINTS_PER_PIECE + 1)
+        pieces = point_ranges(m)
         run_pieces(lambda piece: self._build_frames(*pieces[piece]), len(pieces))
 
     def __call__(
@@ -152,7 +153,7 @@ class ClosestPoint:
         squares, slots = self.search(centered, self._seeds(len(points), seed_faces), progress)
         n = len(points)
         faces, weights, feet = np.empty(n, np.int32), np.empty((n, 3)), np.empty((n, 3))
-        pieces = even_ranges(n, n // POINTS_PER_PIECE + 1)
+        pieces = point_ranges(n)
 
         def work(piece: int) -> None:
             begin, end = pieces[piece]
@@ -195,7 +196,7 @@ class ClosestPoint:
         sequence = morton_order(centered)
         n = len(centered)
         squares, slots = np.empty(n), np.empty(n, np.int32)
-        pieces = even_ranges(n, n // POINTS_PER_PIECE + 1)
+        pieces = point_ranges(n)
 
         def work(piece: int) -> None:
             begin, end = pieces[piece]
@@ -241,6 +242,12 @@ def _check_points(points: Points) -> None:
         "ClosestPoint(...)(points)",
         "leave those points out",
     )
+
+
+def point_ranges(n: int) -> list[tuple[int, int]]:
+    """Split ``range(n)`` into pieces of work: at least one per core, unless these were tiny."""
+    few = min(n_threads(), n // FEWEST_PER_PIECE)
+    return even_ranges(n, max(few, n // POINTS_PER_PIECE + 1))
 
 
 def morton_order(points: Points) -> Indices:
