@@ -53,6 +53,10 @@ class SurfaceError(MeshsdfError):
     """A field cannot be turned into a surface as asked."""
 
 
+class RayError(MeshsdfError):
+    """A picture cannot be made as asked."""
+
+
 class ReportError(MeshsdfError):
     """Two things cannot be compared as asked."""
 

@@ -8,6 +8,11 @@ import numpy as np
 
 def distance_to_triangle(point, triangle) -> float:
     """Distance of one point to one triangle in rational arithmetic; rounded once, at the end."""
+    return _root(square_to_triangle(point, triangle))
+
+
+def square_to_triangle(point, triangle) -> Fraction:
+    """Squared distance of one point to one triangle, without rounding."""
     p = [Fraction(float(x)) for x in point]
     a, b, c = ([Fraction(float(x)) for x in corner] for corner in triangle)
     squares = [_to_segment(p, a, b), _to_segment(p, b, c), _to_segment(p, c, a)]
@@ -20,7 +25,7 @@ def distance_to_triangle(point, triangle) -> float:
         if v >= 0 and w >= 0 and v + w <= 1:
             rest = [ap[i] - v * ab[i] - w * ac[i] for i in range(3)]
             squares.append(_dot(rest, rest))
-    return _root(min(squares))
+    return min(squares)
 
 
 def closest_by_brute_force(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -1,14 +1,13 @@
-"""``meshsdf convert``: mesh to volume."""
-
-import os
-from dataclasses import replace
+"""``meshsdf convert``: a mesh, or another volume, to a volume."""
 
 import click
+from click.core import ParameterSource
 
-from .console import YES, Console, file_size, plural
+from .console import Console
+from .exr_options import exr_options, taken_exr_options
 from .options import (
+    Names,
     PositiveNumber,
-    force_option,
     half_width_option,
     json_option,
     max_memory_option,
@@ -16,125 +15,103 @@ from .options import (
     sign_option,
 )
 
+FOR_MESHES = ("resolution", "voxel_size", "sign", "closest", "hermite", "grids")
+"""Options that say how a mesh is measured."""
+
+FOR_VOLUMES = ("sparse", "grid")
+
 
 @click.command(epilog="Example: meshsdf convert bunny.obj bunny.npz --resolution 256")
-@click.argument("mesh", type=path)
+@click.argument("source", type=path)
 @click.argument("out", type=path)
 @click.option("--resolution", type=PositiveNumber(), help="Voxels along the longest side.")
 @click.option("--voxel-size", type=PositiveNumber(), help="Size of a voxel, world units.")
 @half_width_option
 @sign_option
-@click.option("--dense", is_flag=True, help="A full grid, exact at every node.")
+@click.option("--dense", is_flag=True, help="A full grid; of a mesh, exact at every node.")
+@click.option("--sparse", is_flag=True, help="Of a full grid, the band of --half-width alone.")
 @click.option("--half", is_flag=True, help="Store 16-bit floats.")
 @click.option("--closest", is_flag=True, help="Also store closest faces and barycentrics.")
 @click.option(
     "--hermite",
     is_flag=True,
-    help="Also store crossings, normals and features, for mesh --method dual-contouring; NPZ only.",
+    help="Also store crossings, normals, features, for mesh --method dual-contouring; NPZ, Zarr.",
 )
+@click.option("--grid", help="Which grid of a .vdb or array of a .vti.  [default: the first]")
+@click.option(
+    "--grids",
+    type=Names("surface", "closest", "uv", "Cd"),
+    help="VDB: also store, beside the surface, the closest point on the mesh, its texture "
+    "coordinates, its linear colour; names with commas between.",
+)
+@click.option(
+    "--compression",
+    type=click.Choice(["none", "active", "zip", "blosc"]),
+    help="VDB: store every voxel of a leaf, those in the band, or pack these.  [default: active]",
+)
+@exr_options
 @max_memory_option
-@force_option
+@click.option(
+    "--force",
+    is_flag=True,
+    help="Overwrite files that exist, and accept the loss of what OUT cannot hold.",
+)
 @json_option
-def command(
-    mesh: str,
-    out: str,
-    resolution: float | None,
-    voxel_size: float | None,
-    half_width: float,
-    sign: str,
-    dense: bool,
-    half: bool,
-    closest: bool,
-    hermite: bool,
-    max_memory: float | None,
-    force: bool,
-    as_json: bool,
-) -> int:
-    """Turn MESH into a volume of exact signed distances, OUT.
+@click.pass_context
+def command(context: click.Context, source: str, out: str, as_json: bool, **options: object) -> int:
+    """Turn SOURCE into a volume, OUT: a mesh into exact signed distances, or a volume into another
+    format.
 
-    Without --resolution or --voxel-size the longest side gets 128 voxels.
+    Without --resolution or --voxel-size the longest side of a mesh gets 128 voxels. What a volume
+    holds is copied; what OUT has no place for is told and refused, unless --force accepts it.
     """
-    if resolution is not None and voxel_size is not None:
-        raise click.UsageError("give --resolution or --voxel-size, not both")
-    if dense and closest:
-        raise click.UsageError("--closest is for narrow bands; leave out --dense")
-    if hermite and (dense or not out.lower().endswith(".npz")):
-        raise click.UsageError("--hermite is for narrow bands in .npz files")
-    if voxel_size is None and resolution is None:
-        resolution = 128
+    from ..io import kind_of
+
+    kind = kind_of(source)
+    given = {name for name in options if _is_given(context, name)}
+    _check_options(kind, out, given, options)
+    for_exr = taken_exr_options(out, options)
+    options["writer"] = for_exr
+    if options["compression"] is not None:
+        options["writer"] = {"compression": options["compression"]}
     console = Console("convert", as_json=as_json)
     console.watch_compilation()
-    from ..io import check_input, check_output, read_mesh, write_volume
-    from ..mesh.two_set import check
-    from ..sdf import (
-        choose_sign,
-        mesh_to_band,
-        mesh_to_grid,
-        resolve_voxel_size,
-        union_words,
-    )
-    from ..surface import sample_hermite
+    if kind == "mesh":
+        from .convert_mesh import convert_mesh
 
-    check_input(mesh, kind="mesh")
-    check_output(out, kind="volume", force=force)
-    with console.stage("load"):
-        loaded = read_mesh(mesh, warn=console.warn)
-    with console.stage("check"):
-        report = check(loaded, self_intersections=False)
-        size = resolve_voxel_size(loaded, resolution, voxel_size)
-        choice = choose_sign(report, sign, voxel_size=size)
-    options = {
-        "resolution": resolution,
-        "voxel_size": voxel_size,
-        "half_width": half_width,
-        "sign": sign,
-        "report": report,
-        "max_memory": max_memory,
-        "progress": console.progress,
-    }
-    if dense:
-        volume = mesh_to_grid(loaded, **options)
-    else:
-        volume = mesh_to_band(loaded, closest=closest, **options)
-    if hermite and volume.is_signed:
-        volume = replace(volume, hermite=sample_hermite(loaded, volume, progress=console.progress))
-    with console.stage("write"):
-        write_volume(out, volume, half=half, force=force)
+        return convert_mesh(console, source, out, options)
+    from .convert_volume import convert_volume
 
-    for warning in choice.warnings:
-        console.warn(warning)
-    if hermite and not volume.is_signed:
-        console.warn("no Hermite data: an unsigned band has no crossings")
-    if volume.sign != choice.method:
-        console.warn("no node is inside, so distances are unsigned")
-    facts = volume.facts()
-    if facts.get("uncertain_voxels"):
-        n = plural(facts["uncertain_voxels"], "voxel")
-        where = "near the membranes of openings: the winding number is within 0.05 of 1/2"
-        console.warn(f"{n} {'nearer than that' if choice.by_crossings else where}")
-    if facts.get("n_inner_faces"):
-        console.warn(union_words(report, facts["n_inner_faces"]))
-    stages = ("load", "check", "bricks", "union", "distance", "far field", "sign", "write")
-    seconds = console.timings(*stages)
-    seconds["distance"] += sum(seconds.pop(name) for name in ("bricks", "union", "far field"))
-    console.result(_words(mesh, out, facts, choice, loaded, seconds["total"]))
-    console.json(
-        {"input": mesh, "output": out, "bytes": os.path.getsize(out)}
-        | facts
-        | {"sign": volume.sign, "sign_reason": choice.reason}
-        | {"seconds": seconds, "warnings": console.warnings}
-    )
-    return YES
+    half_width = options["half_width"] if "half_width" in given else None
+    return convert_volume(console, source, out, options | {"half_width": half_width})
 
 
-def _words(mesh: str, out: str, facts: dict, choice, loaded, total: float) -> str:
-    shape = " x ".join(str(n) for n in facts["shape"])
-    kind = "dense grid" if facts["n_bricks"] is None else f"{plural(facts['n_bricks'], 'brick')}"
-    return (
-        f"{mesh}: {plural(loaded.n_vertices, 'vertex', 'vertices')}, "
-        f"{plural(loaded.n_faces, 'face')}\n"
-        f"sign: {facts['sign']} ({choice.reason})\n"
-        f"{out}: {shape} nodes of {facts['voxel_size']:.6g}, {kind}, "
-        f"{plural(facts['active_voxels'], 'active voxel')}, "
-        f"{file_size(os.path.getsize(out))}, {total:.2f} s"
-    )
+def _is_given(context: click.Context, name: str) -> bool:
+    return context.get_parameter_source(name) is not ParameterSource.DEFAULT
+
+
+def _check_options(kind: str, out: str, given: set[str], options: dict) -> None:
+    """UsageError where options do not go together, or with what is converted."""
+    wrong = FOR_VOLUMES if kind == "mesh" else FOR_MESHES
+    for name in wrong:
+        if name in given:
+            option = "--" + name.replace("_", "-")
+            other = "volumes" if kind == "mesh" else "meshes; distances of a volume are copied"
+            raise click.UsageError(f"{option} is for {other}")
+    suffix = out.lower()
+    if options["compression"] is not None and not suffix.endswith(".vdb"):
+        raise click.UsageError("--compression is for .vdb files")
+    if kind == "volume":
+        if "half_width" in given and not options["sparse"]:
+            raise click.UsageError("--half-width is for meshes, or for --sparse")
+        if options["sparse"] and options["dense"]:
+            raise click.UsageError("give --sparse or --dense, not both")
+        return
+    if options["resolution"] is not None and options["voxel_size"] is not None:
+        raise click.UsageError("give --resolution or --voxel-size, not both")
+    if options["dense"] and options["closest"]:
+        raise click.UsageError("--closest is for narrow bands; leave out --dense")
+    if options["hermite"] and (options["dense"] or not suffix.endswith((".npz", ".zarr"))):
+        raise click.UsageError("--hermite is for narrow bands in .npz and .zarr")
+    if options["grids"] is not None and (options["dense"] or not suffix.endswith(".vdb")):
+        raise click.UsageError("--grids is for narrow bands in .vdb files")

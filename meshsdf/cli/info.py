@@ -1,7 +1,5 @@
 """``meshsdf info``: what is in a file."""
 
-import os
-
 import click
 
 from .console import YES, Console, file_size, plural
@@ -12,15 +10,17 @@ from .options import json_option, path
 @click.argument("file", type=path)
 @json_option
 def command(file: str, as_json: bool) -> int:
-    """What is in FILE, a mesh or a volume. Volumes are described from their headers."""
+    """What is in FILE: a mesh, a volume or samples, these two from their headers."""
     console = Console("info", as_json=as_json)
-    from ..io import check_input, kind_of, probe_volume
+    from ..io import check_input, kind_of, probe_samples, probe_volume, stored_bytes
 
     check_input(file)
-    if kind_of(file) == "volume":
-        facts = probe_volume(file)
-        console.result(_volume_words(file, facts))
-        console.json({"input": file, "bytes": os.path.getsize(file)} | facts)
+    n_bytes = stored_bytes(file)
+    facts = probe_samples(file) if file.lower().endswith((".npz", ".ply")) else None
+    if facts is not None or kind_of(file) == "volume":
+        facts = facts or probe_volume(file)
+        console.result(_volume_words(file, n_bytes, facts))
+        console.json({"input": file, "bytes": n_bytes} | facts)
         return YES
     from ..io import read_mesh
 
@@ -38,13 +38,13 @@ def command(file: str, as_json: bool) -> int:
         "materials": [material.name for material in loaded.materials],
         "n_images": sum(material.image is not None for material in loaded.materials),
     }
-    console.result(_mesh_words(file, facts))
-    head = {"input": file, "bytes": os.path.getsize(file)}
+    console.result(_mesh_words(file, n_bytes, facts))
+    head = {"input": file, "bytes": n_bytes}
     console.json(head | facts | {"warnings": console.warnings})
     return YES
 
 
-def _mesh_words(file: str, facts: dict) -> str:
+def _mesh_words(file: str, n_bytes: int, facts: dict) -> str:
     carried = [
         text
         for text, has in (
@@ -58,15 +58,15 @@ def _mesh_words(file: str, facts: dict) -> str:
     ranges = zip("xyz", facts["lower"], facts["upper"], strict=True)
     return (
         f"{file}: mesh, {plural(facts['n_vertices'], 'vertex', 'vertices')}, "
-        f"{plural(facts['n_faces'], 'face')}, {file_size(os.path.getsize(file))}\n"
+        f"{plural(facts['n_faces'], 'face')}, {file_size(n_bytes)}\n"
         + "  ".join(f"{axis} {low:.6g} to {high:.6g}" for axis, low, high in ranges)
         + f"\ncarries: {', '.join(carried) or 'shape only'}"
     )
 
 
-def _volume_words(file: str, facts: dict) -> str:
+def _volume_words(file: str, n_bytes: int, facts: dict) -> str:
     kind = facts["kind"].replace("_", " ")
-    lines = [f"{file}: {kind}, {file_size(os.path.getsize(file))}"]
+    lines = [f"{file}: {kind}, {file_size(n_bytes)}"]
     lines += _fact_lines({key: value for key, value in facts.items() if key != "kind"}, "  ")
     return "\n".join(lines)
 

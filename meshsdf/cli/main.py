@@ -19,11 +19,13 @@ from .console import CTRL_C, INTERRUPTED, UNUSABLE
 
 COMMANDS = {
     "check": "Does a mesh part space into inside and outside? Says where it does not.",
-    "convert": "Turn a mesh into a volume of signed distances.",
+    "convert": "Turn a mesh into a volume of signed distances, or a volume into another format.",
     "mesh": "Turn a volume into a mesh.",
     "roundtrip": "Mesh to volume to mesh: how much is lost at which resolution?",
     "compare": "How far apart are two meshes?",
     "info": "What is in a mesh or a volume file.",
+    "sample": "Points with their signed distances to a mesh, for learning.",
+    "render": "Draw a mesh or a volume, or how far it is from another mesh.",
     "demo": "Make a mesh, check, convert and round-trip it, and draw pictures.",
 }
 

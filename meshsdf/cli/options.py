@@ -64,6 +64,35 @@ class Names(click.ParamType):
         return found
 
 
+class PositiveNumbers(Resolutions):
+    """Comma-separated numbers above zero, told as such."""
+
+    name = "number,..."
+
+
+class Counts(click.ParamType):
+    """Comma-separated names out of a few, each with or without a count: a dict, None for none."""
+
+    name = "name[=count],..."
+
+    def __init__(self, *names: str) -> None:
+        self.names = names
+
+    def convert(self, value, param, ctx):
+        if isinstance(value, dict):
+            return value
+        found = {}
+        for part in value.split(","):
+            name, equals, count = (text.strip() for text in part.partition("="))
+            if name not in self.names or name in found:
+                told = "is given twice" if name in found else f"is none of {', '.join(self.names)}"
+                self.fail(f"{name!r} {told}", param, ctx)
+            if equals and not (count.isascii() and count.isdigit() and len(count) < 16):
+                self.fail(f"{count!r} is no count", param, ctx)
+            found[name] = int(count) if equals else None
+        return found
+
+
 class Bytes(click.ParamType):
     """A size such as 500M, 4G or 1.5e9."""
 

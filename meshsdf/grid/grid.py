@@ -29,6 +29,9 @@ class Grid:
     n_inner_faces : int
         Faces of the mesh that lie inside the union of its overlapping parts, wholly or in part;
         distances are not measured to those.
+    half_width : float or None
+        Voxels from the surface beyond which values are clipped to +-`background`, as those of a
+        narrow band; None where they are distances everywhere.
 
     Raises
     ------
@@ -42,6 +45,7 @@ class Grid:
     sign: str = "parity"
     uncertain_voxels: int | None = None
     n_inner_faces: int = 0
+    half_width: float | None = None
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.voxel_size) and self.voxel_size > 0):
@@ -53,6 +57,13 @@ class Grid:
     def is_signed(self) -> bool:
         """Whether values are negative inside."""
         return self.sign != "unsigned"
+
+    @property
+    def background(self) -> float | None:
+        """Magnitude of clipped values, world units, as stored (float32); None if none are."""
+        if self.half_width is None:
+            return None
+        return float(np.float32(self.half_width * self.voxel_size))
 
     def facts(self) -> dict:
         """Return what scripts ask for: kind, voxel_size, shape, active_voxels, …"""
@@ -69,4 +80,6 @@ class Grid:
             facts["uncertain_voxels"] = self.uncertain_voxels
         if self.n_inner_faces:
             facts["n_inner_faces"] = self.n_inner_faces
+        if self.half_width is not None:
+            facts["half_width"], facts["background"] = self.half_width, self.background
         return facts

@@ -1,4 +1,4 @@
-"""Write a file beside its place and rename it there: a stop leaves the old file, or none.
+"""Write a file or folder beside its place and rename it there: a stop leaves the old one, or none.
 
 The bytes reach the disk (fsync) before the name does, so a power cut cannot leave half a file
 under the final name either.
@@ -7,13 +7,14 @@ under the final name either.
 import errno
 import os
 import secrets
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import IoError
-from .registry import Kind, format_of
+from .registry import Kind, folder_marker, format_of
 
 _FULL = {errno.ENOSPC, errno.EDQUOT}
 _NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EACCES}
@@ -35,7 +36,7 @@ def check_output(path: str | os.PathLike, force: bool = False, *, kind: Kind | N
     ------
     IoError
         The suffix does not suit the kind, the file exists and ``force`` is false, it is a folder
-        or a device, its folder is missing or does not allow new files.
+        (but no volume that is one) or a device, its folder is missing or allows no new files.
     """
     if kind is not None:
         format_of(path, kind, "writer")
@@ -54,8 +55,8 @@ def check_output(path: str | os.PathLike, force: bool = False, *, kind: Kind | N
         raise IoError(f"cannot write: {error.strerror}", where, "choose another name") from error
     if mode is not None:
         if stat.S_ISDIR(mode):
-            raise IoError("the output is a folder", where, "give the name of a file in it")
-        if not stat.S_ISREG(mode):
+            _check_old_folder(target, where)
+        elif not stat.S_ISREG(mode):
             raise IoError("the output is not a regular file", where, "give the name of a file")
         if not force:
             raise _exists(where)
@@ -103,6 +104,40 @@ def atomic_write(path: str | os.PathLike, force: bool = False) -> Iterator[Path]
             temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def atomic_folder(path: str | os.PathLike, force: bool = False) -> Iterator[Path]:
+    """Yield a new, empty folder beside ``path``; move it there when the block ends.
+
+    For volumes that are folders. An old one is moved aside, then removed: a stop between leaves it
+    beside, under a name that begins with ``.meshsdf-``.
+
+    Parameters
+    ----------
+    path : path
+        The folder to be written. A symbolic link is followed.
+    force : bool
+        Whether what is there may be replaced: a file, or a volume that is a folder.
+
+    Raises
+    ------
+    IoError
+        As `atomic_write`.
+    """
+    check_output(path, force)
+    target = _target(path)
+    where = f"output {path}"
+    temporary = target.with_name(f".meshsdf-{secrets.token_hex(8)}{target.suffix}")
+    try:
+        os.mkdir(temporary)
+        yield temporary
+        _flush_all(temporary)
+        _place_folder(temporary, target, force, where)
+    except OSError as error:
+        raise _explained(error, target.parent, where) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
 def write_text(path: str | os.PathLike, text: str, *, force: bool = False) -> None:
     """Write a text file (UTF-8) as `atomic_write` does; IoError as there."""
     with atomic_write(path, force) as temporary:
@@ -134,6 +169,44 @@ def _target(path: str | os.PathLike) -> Path:
 def _flush(path: Path) -> None:
     with open(path, "rb+") as file:
         os.fsync(file.fileno())
+
+
+def _flush_all(folder: Path) -> None:
+    if hasattr(os, "sync"):
+        os.sync()  # once for all files, of which there may be thousands
+        return
+    for path in folder.rglob("*"):
+        if path.is_file():
+            _flush(path)
+
+
+def _check_old_folder(target: Path, where: str) -> None:
+    """IoError unless the folder is a volume, which may be replaced as a file may."""
+    marker = folder_marker(target)
+    if not marker:
+        raise IoError("the output is a folder", where, "give the name of a file in it")
+    if not (target / marker).is_file():
+        what = f"the output is a folder without {marker}, so no volume; it is not replaced"
+        raise IoError(what, where, "choose another name")
+
+
+def _place_folder(temporary: Path, target: Path, force: bool, where: str) -> None:
+    """Give the temporary folder its final name; without ``force``, only if that is still free."""
+    aside = temporary.with_name(f"{temporary.name}-old")
+    try:
+        if force and target.exists():
+            os.rename(target, aside)
+        os.rename(temporary, target)
+    except BaseException as error:
+        if aside.exists() and not target.exists():
+            os.rename(aside, target)
+        if getattr(error, "errno", None) in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
+            raise _exists(where) from None
+        raise
+    if aside.is_dir():
+        shutil.rmtree(aside, ignore_errors=True)
+    else:
+        aside.unlink(missing_ok=True)
 
 
 def _place(temporary: Path, target: Path, force: bool, where: str) -> None:

@@ -21,7 +21,7 @@ _HEADER = re.compile(
     rb"\{'descr': '([<|])([A-Za-z])(\d{1,4})', 'fortran_order': False, "
     rb"'shape': \(((?:\d{1,18}(?:, ?\d{1,18})*,?)?)\), \} *\n"
 )
-_KINDS = {"f": (2, 4, 8), "i": (4, 8), "u": (8,), "U": range(1, 65)}
+_KINDS = {"f": (2, 4, 8), "i": (1, 4, 8), "u": (8,), "U": range(1, 65)}
 _MAX_ENTRIES = 64
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _CHUNK = 1 << 24

@@ -30,6 +30,7 @@ Grid:
 - ``values`` (ni, nj, nk) float32 or float64, or float16; NaN where there are no data
 - ``origin`` (3,) float64: world position of node (0, 0, 0)
 - ``uncertain_voxels`` int64: at how many nodes near the surface the side is not certain, if any
+- ``half_width`` float64: voxels from the surface beyond which values are clipped, if they are
 """
 
 import os
@@ -58,7 +59,7 @@ _NAMED_BY = {
     _A: "hermite_arcs",
 }
 _FLOATS = ("<f2", "<f4")
-_BAND_KEYS = {
+BAND_KEYS = {
     "format": ("text", ()),
     "voxel_size": (("<f8",), ()),
     "translation": (("<f8",), (3,)),
@@ -83,8 +84,8 @@ _HERMITE_KEYS = {
     "hermite_arcs": (("<i8",), (_A,)),
     "hermite_arc_points": (("<f8",), (_A, 3)),
 }
-_BAND_KEYS |= _HERMITE_KEYS
-_GRID_KEYS = {
+BAND_KEYS |= _HERMITE_KEYS
+GRID_KEYS = {
     "format": ("text", ()),
     "voxel_size": (("<f8",), ()),
     "origin": (("<f8",), (3,)),
@@ -92,7 +93,11 @@ _GRID_KEYS = {
     "values": ((*_FLOATS, "<f8"), (None, None, None)),
     "uncertain_voxels": (("<i8",), ()),
     "n_inner_faces": (("<i8",), ()),
+    "half_width": (("<f8",), ()),
 }
+SAMPLE_KEYS = {"pos", "neg"}
+"""What DeepSDF's files of samples have, which are ``.npz`` files, too."""
+
 _OPTIONAL = {"closest_face", "barycentric", "uncertain", "uncertain_voxels", "n_inner_faces"}
 _OPTIONAL |= _HERMITE_KEYS.keys()
 
@@ -128,7 +133,7 @@ def write_npz(
         raise IoError(f"the volume cannot be written: {error}", where, "build it anew") from error
     if half:
         check_half(volume.values, where)
-    arrays = _band_arrays(volume) if isinstance(volume, NarrowBand) else _grid_arrays(volume)
+    arrays = band_arrays(volume) if isinstance(volume, NarrowBand) else grid_arrays(volume)
     if half:
         arrays["values"] = halved(arrays["values"])
     with atomic_write(path, force) as temporary:
@@ -147,10 +152,10 @@ def read_npz(path: str | os.PathLike) -> NarrowBand | Grid:
     path = checked_input(path)
     try:
         with ArchiveReader(path) as archive:
-            kind = _kind(archive)
-            _check_headers(archive.headers, kind)
+            kind = _kind(archive, path)
+            check_headers(archive.headers, kind)
             arrays = {name: archive.read(name) for name in archive.headers}
-        volume = _band(arrays) if kind == BAND else _grid(arrays)
+        volume = band_of(arrays) if kind == BAND else grid_of(arrays)
         check_volume(volume)
     except GridError as error:
         raise _unreadable(path, error.what) from error
@@ -174,10 +179,11 @@ def probe_npz(path: str | os.PathLike) -> dict:
     path = checked_input(path)
     try:
         with ArchiveReader(path) as archive:
-            kind = _kind(archive)
-            _check_headers(archive.headers, kind)
+            kind = _kind(archive, path)
+            check_headers(archive.headers, kind)
             small = ["voxel_size", "sign"]
-            small += ["half_width", "translation"] if kind == BAND else ["origin"]
+            small += ["translation"] if kind == BAND else ["origin"]
+            small += ["half_width"] if "half_width" in archive.headers else []
             facts = {name: archive.read(name).tolist() for name in small}
             values = archive.headers["values"]
     except OSError as error:
@@ -194,7 +200,7 @@ def probe_npz(path: str | os.PathLike) -> dict:
     return {"kind": "grid", **facts}
 
 
-def _band_arrays(band: NarrowBand) -> dict[str, np.ndarray]:
+def band_arrays(band: NarrowBand) -> dict[str, np.ndarray]:
     index = band.index
     arrays = {
         "format": np.array(BAND),
@@ -219,7 +225,7 @@ def _band_arrays(band: NarrowBand) -> dict[str, np.ndarray]:
     return arrays
 
 
-def _grid_arrays(grid: Grid) -> dict[str, np.ndarray]:
+def grid_arrays(grid: Grid) -> dict[str, np.ndarray]:
     arrays = {
         "format": np.array(GRID),
         "voxel_size": np.array(grid.voxel_size, np.float64),
@@ -229,12 +235,14 @@ def _grid_arrays(grid: Grid) -> dict[str, np.ndarray]:
     }
     if grid.uncertain_voxels is not None:
         arrays["uncertain_voxels"] = np.array(grid.uncertain_voxels, np.int64)
+    if grid.half_width is not None:
+        arrays["half_width"] = np.array(grid.half_width, np.float64)
     if grid.n_inner_faces:
         arrays["n_inner_faces"] = np.array(grid.n_inner_faces, np.int64)
     return arrays
 
 
-def _band(arrays: dict[str, np.ndarray]) -> NarrowBand:
+def band_of(arrays: dict[str, np.ndarray]) -> NarrowBand:
     tables = [arrays[name] for name in ("coordinates", "page_origin", "root", "pages")]
     return NarrowBand(
         BrickIndex(*tables),
@@ -258,11 +266,11 @@ def _hermite(arrays: dict[str, np.ndarray]) -> Hermite | None:
     return Hermite(*(arrays[name] for name in _HERMITE_KEYS))
 
 
-def _grid(arrays: dict[str, np.ndarray]) -> Grid:
+def grid_of(arrays: dict[str, np.ndarray]) -> Grid:
     values = arrays["values"]
     if values.dtype == np.float16:
         values = values.astype(np.float32)
-    doubts = arrays.get("uncertain_voxels")
+    doubts, width = arrays.get("uncertain_voxels"), arrays.get("half_width")
     return Grid(
         values,
         float(arrays["voxel_size"]),
@@ -270,11 +278,15 @@ def _grid(arrays: dict[str, np.ndarray]) -> Grid:
         str(arrays["sign"]),
         None if doubts is None else int(doubts),
         int(arrays.get("n_inner_faces", 0)),
+        None if width is None else float(width),
     )
 
 
-def _kind(archive: ArchiveReader) -> str:
+def _kind(archive: ArchiveReader, path: Path) -> str:
     header = archive.headers.get("format")
+    if archive.headers.keys() >= SAMPLE_KEYS or {"points", "distance"} <= archive.headers.keys():
+        what = f"{path.name} holds samples of distances at scattered points, not a volume"
+        raise IoError(what, f"file {path}", "look at it with meshsdf info, or read it with numpy")
     if header is None or header.dtype.kind != "U" or header.shape != ():
         raise ValueError("it has no 'format' key, so it is not a volume of meshsdf")
     kind = str(archive.read("format"))
@@ -283,9 +295,11 @@ def _kind(archive: ArchiveReader) -> str:
     return kind
 
 
-def _check_headers(headers: dict[str, ArrayHeader], kind: str) -> None:
-    keys = _BAND_KEYS if kind == BAND else _GRID_KEYS
+def check_headers(headers: dict[str, ArrayHeader], kind: str) -> None:
+    keys = BAND_KEYS if kind == BAND else GRID_KEYS
     missing = keys.keys() - headers.keys() - _OPTIONAL
+    if kind == GRID:
+        missing -= {"half_width"}  # of distances that are not clipped
     if some := _HERMITE_KEYS.keys() & headers.keys():
         missing |= _HERMITE_KEYS.keys() - some if kind == BAND else set()
     unknown = headers.keys() - keys.keys()

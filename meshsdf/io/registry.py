@@ -34,6 +34,24 @@ class Format:
         Functions of that module; empty if it cannot.
     has_names : bool
         Whether a file may hold several things, and the reader takes ``grid`` and ``warn``.
+    has_warnings : bool
+        Whether reader and writer take ``warn``, to say what they could not keep.
+    marker : str
+        Of a format whose volumes are folders: the file that each of them has.
+    holds : frozenset of str
+        What the writer keeps of a volume, in the words below; what is missing is lost.
+
+    Notes
+    -----
+    Words of ``holds``:
+
+    - ``band``: narrow bands as such; ``grid``: full grids
+    - ``half``: float16; ``double``: float64; ``gaps``: nodes without a value (NaN)
+    - ``transform``: voxel size and place in the world
+    - ``sign``: how inside was told; ``half_width``: where the distances of a grid are clipped
+    - ``closest``: closest faces and barycentrics; ``hermite``: crossings, normals and features;
+      ``uncertain``: which nodes of a band have no certain side
+    - ``vectors``: three numbers a node, by functions of the format's own module
     """
 
     name: str
@@ -44,10 +62,28 @@ class Format:
     writer: str = ""
     prober: str = ""
     has_names: bool = False
+    has_warnings: bool = False
+    marker: str = ""
+    holds: frozenset[str] = frozenset()
 
     def function(self, name: str) -> Callable:
         """Return a function of the format's module, which is imported now."""
         return getattr(import_module(f".{self.module}", __package__), name)
+
+
+_SPELLED = frozenset({"grid", "transform"})
+_UNPLACED = frozenset({"grid", "gaps"})
+_PLACED = _UNPLACED | {"double", "transform", "sign", "half_width"}
+_SPARSE = frozenset({"band", "grid", "half", "gaps", "transform", "sign", "half_width"})
+_SPARSE |= {"closest", "uncertain"}
+
+
+def _volume(
+    name: str, suffixes: tuple[str, ...], module: str, holds: frozenset[str], **options: bool
+) -> Format:
+    """A volume format whose functions are named after its module."""
+    names = (f"{verb}_{module}" for verb in ("read", "write", "probe"))
+    return Format(name, suffixes, "volume", module, *names, holds=holds, **options)
 
 
 FORMATS = (
@@ -57,8 +93,20 @@ FORMATS = (
     Format("OFF", (".off",), "mesh", "off", "read_off", "write_off"),
     Format("GLB", (".glb",), "mesh", "gltf", "read_gltf", "write_glb"),
     Format("glTF", (".gltf",), "mesh", "gltf", "read_gltf"),
-    Format("NPZ volume", (".npz",), "volume", "npz", "read_npz", "write_npz", "probe_npz"),
-    Format("OpenVDB", (".vdb",), "volume", "vdb", "read_vdb", "write_vdb", "probe_vdb", True),
+    _volume("NPZ volume", (".npz",), "npz", _SPARSE | {"double", "hermite"}),
+    _volume("OpenVDB", (".vdb",), "vdb", _SPARSE | {"vectors"}, has_names=True),
+    _volume("NRRD", (".nrrd", ".nhdr"), "nrrd", _PLACED, has_warnings=True),
+    _volume("MetaImage", (".mha", ".mhd"), "metaimage", _PLACED, has_warnings=True),
+    _volume("VTK ImageData", (".vti",), "vti", _PLACED, has_names=True, has_warnings=True),
+    _volume("raw with JSON", (".raw",), "raw", _PLACED | {"half"}, has_warnings=True),
+    _volume("Unity volume", (".vf",), "vf", _UNPLACED | {"vectors"}, has_warnings=True),
+    _volume("SDFGen grid", (".sdf",), "sdfgen", _SPELLED, has_warnings=True),
+    _volume("OpenEXR", (".exr",), "exr", (_PLACED | {"half"}) - {"double"}, has_warnings=True),
+    Format(
+        *("Zarr", (".zarr",), "volume", "zarr_volume", "read_zarr", "write_zarr", "probe_zarr"),
+        marker="zarr.json",
+        holds=_SPARSE | {"double", "hermite"},
+    ),
 )
 
 
@@ -119,18 +167,35 @@ def check_input(path: str | os.PathLike, *, kind: Kind | None = None) -> None:
 
 
 def checked_input(path: str | os.PathLike) -> Path:
-    """Return the path as a `Path`; IoError if there is no regular file to read."""
+    """Return the path as a `Path`; IoError if there is no regular file to read, nor a volume that
+    is a folder."""
     path = Path(path)
     try:
         if path.is_file():
             return path
         if path.is_dir():
+            if folder_marker(path):
+                return path
             raise IoError("this is a folder, not a file", f"file {path}", "name a file in it")
         if path.exists():
             raise IoError("this is not a regular file", f"file {path}", "copy it to a file first")
     except (OSError, ValueError) as error:  # a name with a NUL, or too long
         raise IoError(f"no file can have this name ({error})", f"file {path}", "check it") from None
     raise IoError("no such file", f"file {path}", _nearest_file(path))
+
+
+def folder_marker(path: str | os.PathLike) -> str:
+    """The file that each folder of a format has; empty if the suffix names no such format."""
+    suffix = Path(path).suffix.lower()
+    return next((f.marker for f in FORMATS if suffix in f.suffixes), "")
+
+
+def stored_bytes(path: str | os.PathLike) -> int:
+    """Return the bytes of a file, or of all files of a volume that is a folder."""
+    path = Path(path)
+    if path.is_file():
+        return path.stat().st_size
+    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
 
 
 def _nearest_file(path: Path) -> str:

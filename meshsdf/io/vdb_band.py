@@ -2,10 +2,11 @@
 
 A band is one level set: bricks are leaves, inside and outside are tiles of -background and
 background. What a level set cannot say stands in metadata: ``meshsdf_sign``, and the half width as
-``meshsdf_half_width``, because the background (a float32) does not tell it exactly. Closest faces,
-barycentrics and doubtful nodes are grids of their own beside it, which ``meshsdf_of`` ties to it:
-``closest_face`` (int32), ``barycentric`` (vec3s: the weights of the face's second and third
-corner, then 0) and ``uncertain`` (float: active, and 1, where the side is not certain).
+``meshsdf_half_width``, because the background (a float32) does not tell it exactly, and, where
+there are such faces, ``meshsdf_n_inner_faces``. Closest faces, barycentrics and doubtful nodes are
+grids of their own beside it, which ``meshsdf_of`` ties to it: ``closest_face`` (int32),
+``barycentric`` (vec3s: the weights of the face's second and third corner, then 0) and
+``uncertain`` (float: active, and 1, where the side is not certain).
 """
 
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Matrix4, Number, Vector3
-from ..grid import NarrowBand
+from ..grid import Grid, NarrowBand
 from ..grid.brick_grid import node_mask
 from ..grid.brick_index import INSIDE, OUTSIDE
 from .vdb_fill import fill_tiles
@@ -24,6 +25,7 @@ from .vdb_transform import uniform_scale
 from .warn import Warn
 
 SIGN, HALF_WIDTH, OF = "meshsdf_sign", "meshsdf_half_width", "meshsdf_of"
+INNER = "meshsdf_n_inner_faces"
 COMPANIONS = {"closest_face": "int32", "barycentric": "vec3s", "uncertain": "float"}
 """Names and value types of the grids beside a band."""
 
@@ -53,34 +55,36 @@ def band_to_grids(band: NarrowBand, name: str, *, is_half: bool) -> list[VdbGrid
         np.array(band.background, np.float32),
         placing(band.voxel_size, band.translation),
         grid_class="level set" if band.is_signed else "unknown",
-        metadata={SIGN: band.sign, HALF_WIDTH: float(band.half_width)},
+        metadata={SIGN: band.sign, HALF_WIDTH: float(band.half_width)} | inner_words(band),
         is_half=is_half,
     )
-    # Beside it nothing is inside
-    tables = [np.where(t == INSIDE, OUTSIDE, t) for t in (band.index.root, band.index.pages)]
-    plain = {
-        "index": replace(band.index, root=tables[0], pages=tables[1]),
-        "grid_class": "unknown",
-        "metadata": {OF: name},
-        "is_half": False,
-    }
+    plain = without_inside(surface)
     single, shape = np.dtype(np.float32), band.values.shape
     beside = []
     if band.closest_face is not None:
         none = np.array(-1, np.int32)
         faces = {"name": "closest_face", "values": band.closest_face, "background": none}
-        beside.append(replace(surface, **faces, **plain))
+        beside.append(replace(plain, **faces, metadata={OF: name}))
     if band.barycentric is not None:
         given = band.barycentric
         made = _Made(single, (*shape, 3), lambda s: np.pad(given[s], [(0, 0)] * 4 + [(0, 1)]))
         weights = {"name": "barycentric", "values": made, "background": np.zeros(3, single)}
-        beside.append(replace(surface, **weights, **plain))
+        beside.append(replace(plain, **weights, metadata={OF: name}))
     if band.uncertain is not None:
         words = band.uncertain
         made = _Made(single, shape, lambda s: node_mask(words[s]).astype(single))
         doubts = {"name": "uncertain", "values": made, "active": words}
-        beside.append(replace(surface, **doubts, background=np.zeros((), single), **plain))
+        doubts["background"] = np.zeros((), single)
+        beside.append(replace(plain, **doubts, metadata={OF: name}))
     return [surface, *beside]
+
+
+def without_inside(surface: VdbGrid) -> VdbGrid:
+    """The grid of a band made ready for what stands beside it: nothing is inside, nothing half."""
+    index = surface.index
+    tables = [np.where(table == INSIDE, OUTSIDE, table) for table in (index.root, index.pages)]
+    index = replace(index, root=tables[0], pages=tables[1])
+    return replace(surface, index=index, grid_class="unknown", metadata={}, is_half=False)
 
 
 def placing(voxel_size: Number, origin: Vector3) -> Matrix4:
@@ -136,6 +140,7 @@ def grid_to_band(grid: VdbGrid, warn: Warn) -> NarrowBand:
         np.ascontiguousarray(grid.matrix[:3, 3]),
         _half_width(grid, size, background),
         told_sign(grid, _FOREIGN_SIGN),
+        n_inner_faces=told_inner(grid),
     )
 
 
@@ -160,6 +165,17 @@ def told_sign(grid: VdbGrid, default: str) -> str:
     sign = grid.metadata.get(SIGN)
     is_word = isinstance(sign, str) and sign.isascii() and sign.isprintable()
     return sign if is_word and 0 < len(sign) <= _LONGEST_SIGN else default
+
+
+def inner_words(volume: NarrowBand | Grid) -> dict[str, int]:
+    """Metadata that tells the number of inner faces, if there are any."""
+    return {INNER: volume.n_inner_faces} if volume.n_inner_faces else {}
+
+
+def told_inner(grid: VdbGrid) -> int:
+    """The number of inner faces, if the file says it."""
+    told = grid.metadata.get(INNER, 0)
+    return told if isinstance(told, int) and 0 <= told < 1 << 62 else 0
 
 
 def _half_width(grid: VdbGrid, size: float, background: float) -> float:

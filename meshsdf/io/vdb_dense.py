@@ -15,7 +15,15 @@ from ..arrays import BrickCoordinates, BrickMasks, Ijk1
 from ..grid import BrickIndex, Grid
 from ..grid.brick_grid import node_mask, node_words
 from ..grid.brick_index import BRICK, OUTSIDE, PAGE
-from .vdb_band import SIGN, placing, require_uniform, told_sign
+from .vdb_band import (
+    HALF_WIDTH,
+    SIGN,
+    inner_words,
+    placing,
+    require_uniform,
+    told_inner,
+    told_sign,
+)
 from .vdb_grid import VdbGrid
 from .vdb_pages import constant_blocks
 from .vdb_stream import UnsuitedError
@@ -86,6 +94,9 @@ def dense_to_grid(grid: Grid, name: str, grid_class: GridClass, *, is_half: bool
     metadata = {SIGN: grid.sign, SHAPE: grid.values.shape}
     if grid.uncertain_voxels is not None:
         metadata[DOUBTS] = grid.uncertain_voxels
+    if grid.half_width is not None:
+        metadata[HALF_WIDTH] = float(grid.half_width)
+    metadata |= inner_words(grid)
     return VdbGrid(
         name,
         _paged(table, coordinates),
@@ -174,13 +185,15 @@ def grid_to_dense(grid: VdbGrid, file_bytes: int) -> Grid:
     with np.errstate(over="ignore"):  # what does not fit becomes infinite, and is refused so
         values = _unpacked(grid, low, shape, only_active=only_active)
     default = "winding" if np.fmin.reduce(values, axis=None, initial=0) < 0 else "unsigned"
-    doubts = grid.metadata.get(DOUBTS)
+    doubts, width = grid.metadata.get(DOUBTS), grid.metadata.get(HALF_WIDTH)
     return Grid(
         values,
         size,
         grid.matrix[:3, 3] + size * low if low.any() else np.ascontiguousarray(grid.matrix[:3, 3]),
         told_sign(grid, default),
         doubts if isinstance(doubts, int) and is_ours else None,
+        told_inner(grid) if is_ours else 0,
+        half_width=width if isinstance(width, float) and is_ours else None,
     )
 
 

@@ -23,6 +23,8 @@ def check_volume(volume: NarrowBand | Grid) -> None:
     _check_sign(volume.sign)
     if isinstance(volume, Grid):
         _check_finite("origin", volume.origin)
+        if volume.half_width is not None:
+            _check_length("half_width", volume.half_width)
         if np.isinf(volume.values).any():
             raise ValueError("values are infinite; NaN says that there are no data")
         return

@@ -17,6 +17,7 @@ from .measures import (
 from .mesh import Material, Mesh
 from .outer_boundary import OuterBoundary, outer_boundary
 from .primitives import box_mesh, cylinder, icosphere, tetrahedron
+from .sampling import SurfacePoints, sample_surface
 from .self_intersections import SelfIntersections, find_self_intersections
 from .tubes import closed_tube, torus, trefoil_tube
 from .two_set import check
@@ -30,6 +31,7 @@ __all__ = [
     "Mesh",
     "OuterBoundary",
     "SelfIntersections",
+    "SurfacePoints",
     "TwoSetReport",
     "area",
     "box_mesh",
@@ -49,6 +51,7 @@ __all__ = [
     "odd_faces",
     "outer_boundary",
     "residual_edge_lines",
+    "sample_surface",
     "tetrahedron",
     "torus",
     "trefoil_tube",

@@ -71,6 +71,24 @@ def euler_number(mesh: Mesh) -> int:
     return int(used.sum()) - _edges(mesh).n_edges + mesh.n_faces
 
 
+def genus(mesh: Mesh) -> int | None:
+    """Return the number of handles of all components together, by index; None unless watertight.
+
+    Fans of faces that touch at a vertex without sharing an edge are taken apart there first.
+    """
+    if not is_watertight(mesh):
+        return None
+    table = _edges(mesh)
+    # Corners at one vertex hang together over the two faces of an edge
+    one, two = table.half_edges.reshape(-1, 2).T
+    face, turn = np.divmod(np.stack([one, two]), 3)
+    after = 3 * face + (turn + 1) % 3
+    links = np.concatenate([np.column_stack([one, after[1]]), np.column_stack([after[0], two])])
+    n_fans = int(connected_labels(3 * mesh.n_faces, links).max()) + 1
+    euler = n_fans - table.n_edges + mesh.n_faces
+    return n_components(mesh) - euler // 2
+
+
 def n_components(mesh: Mesh) -> int:
     """Return the number of pieces, where faces that share an edge by index hang together."""
     labels, n_pieces = component_labels(_edges(mesh))

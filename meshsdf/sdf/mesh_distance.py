@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool
 
 from ..arrays import Barycentrics, Indices, Points, Values
 from ..errors import SdfError
@@ -30,12 +31,15 @@ class PointDistances:
         The face of the mesh that it lies on.
     barycentric : (n, 3) float64
         ``closest_point = barycentric @ corners of the face``; each in [0, 1], together 1.
+    uncertain : (n,) bool or None
+        Of which the side is not certain, as `NarrowBand.uncertain` says; None if it is of all.
     """
 
     distance: Values
     closest_point: Points
     face_index: Indices
     barycentric: Barycentrics
+    uncertain: Bool[np.ndarray, " n"] | None = None
 
 
 class MeshDistance:
@@ -105,6 +109,9 @@ class MeshDistance:
         self._blur = 0.0
         self._query = ClosestPoint(Mesh(welded.points, welded.faces[keep]))
         self._sides = PointSides(mesh, self._query, choice, report)
+        self._certain_beyond = None
+        if choice.by_crossings and report.repair is not None:
+            self._certain_beyond = report.repair.certain_beyond
         parts = None
         if cancel == "winding":
             parts = self._sides.find_union(self._faces, search=may_overlap(report))
@@ -125,11 +132,14 @@ class MeshDistance:
         _check_points(points)
         found = self._query(points, progress=progress)
         distance = found.distance
-        np.negative(distance, out=distance, where=self._sides(points, progress))
+        inside, uncertain = self._sides(points, progress)
+        if self._certain_beyond is not None:
+            uncertain = distance <= self._certain_beyond
+        np.negative(distance, out=distance, where=inside)
         faces, weights = self._faces[found.face_index], found.barycentric
         if self._weights is not None:
             weights = np.einsum("ni,nij->nj", weights, self._weights[found.face_index])
-        return PointDistances(distance, found.point, faces, weights)
+        return PointDistances(distance, found.point, faces, weights, uncertain)
 
     def rounding_bound(self, points: Points) -> Values:
         """(n,) proven bound on the error of the magnitude; the sign is exact beyond it."""

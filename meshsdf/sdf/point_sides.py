@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Int32
 
-from ..arrays import FaceLabels, Points
+from ..arrays import FaceLabels, Points, Values
 from ..kernels.parallel import run_pieces
 from ..kernels.point_crossings import count_above
 from ..mesh import Mesh, outer_boundary, residual_edge_lines
@@ -93,14 +93,19 @@ class PointSides:
         welded = self.mesh.welded
         return parts_of_union(found, placed_ids, self._ids, welded.points, welded.faces)
 
-    def __call__(self, points: Points, progress: Progress = silent) -> Sides:
-        """Return which of (n, 3) finite points lie inside."""
+    def __call__(self, points: Points, progress: Progress = silent) -> tuple[Sides, Sides | None]:
+        """Return which of (n, 3) finite points lie inside, and of which that is not certain.
+
+        The second is None unless generalised winding numbers decide; then it tells which of them
+        are within 0.05 of 1/2.
+        """
         if self.choice.method == "unsigned":
-            return np.zeros(len(points), np.bool_)
+            return np.zeros(len(points), np.bool_), None
         if not self.choice.by_crossings:
-            return self._wound(points)
+            number = self._wound(points)
+            return number > 0.5, np.abs(number - 0.5) < DOUBTFUL
         counts = self.crossings(points, progress)
-        return counts % 2 != 0 if self.choice.method == "parity" else counts != 0
+        return (counts % 2 != 0 if self.choice.method == "parity" else counts != 0), None
 
     def crossings(self, points: Points, progress: Progress = silent) -> Int32[np.ndarray, " n"]:
         """Return the winding number of a closed oriented mesh around each point."""
@@ -118,8 +123,8 @@ class PointSides:
         run_pieces(work, len(pieces), stage="sign", progress=progress)
         return counts
 
-    def _wound(self, points: Points) -> Sides:
+    def _wound(self, points: Points) -> Values:
         number = np.abs(winding_number(self.mesh, points))
         doubtful = np.abs(number - 0.5) < DOUBTFUL
         number[doubtful] = np.abs(winding_number(self.mesh, points[doubtful], exact=True))
-        return number > 0.5
+        return number

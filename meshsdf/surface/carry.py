@@ -61,7 +61,7 @@ def carry(
     query = ClosestPoint(source)
     found = query(surface.vertices, progress=progress)
     if "colours" in what:
-        colours = _colours(source, found.face_index, found.barycentric)
+        colours = colors_at(source, found.face_index, found.barycentric)
         surface = replace(surface, vertex_colors=colours)
     if "uv" in what:
         middles = query(surface.triangles.mean(axis=1), progress=progress)
@@ -92,7 +92,7 @@ def _blend(corners: np.ndarray, barycentric: Barycentrics) -> np.ndarray:
     return np.einsum("nkc,nk->nc", corners, barycentric)
 
 
-def _colours(source: Mesh, face: Indices, barycentric: Barycentrics) -> Float32[np.ndarray, "n 4"]:
+def colors_at(source: Mesh, face: Indices, barycentric: Barycentrics) -> Float32[np.ndarray, "n 4"]:
     """Linear RGBA at places on the source: vertex colour times base colour times image."""
     colours = np.ones((len(face), 4))
     corners = source.faces[face]
@@ -116,13 +116,13 @@ def sample_image(image: np.ndarray, uv: Points2) -> Float64[np.ndarray, "n 4"]:
     Texture coordinate (0, 0) is the image's lower left corner, texel centers lie half a texel in.
     """
     height, width, n_channels = image.shape
-    texels = image / 255.0
+    decoded = linear_from_srgb(np.arange(256) / 255.0)
     has_alpha = n_channels in (2, 4)
     n_colours = n_channels - has_alpha
     rgba = np.ones((height, width, 4))
-    rgba[..., :3] = linear_from_srgb(texels[..., :n_colours])
+    rgba[..., :3] = decoded[image[..., :n_colours]]
     if has_alpha:
-        rgba[..., 3] = texels[..., -1]
+        rgba[..., 3] = image[..., -1] / 255.0
     x, y = uv[:, 0] * width - 0.5, (1.0 - uv[:, 1]) * height - 0.5
     left, top = np.floor(x), np.floor(y)
     tx, ty = (x - left)[:, None], (y - top)[:, None]

@@ -2,6 +2,8 @@
 
 import pytest
 
+from meshsdf.cli.main import COMMANDS
+
 from .examples import ball
 
 
@@ -59,7 +61,7 @@ MISUSE = {
     "one mesh": (["compare", "M"], "Missing argument 'B'"),
     "no command": (["chek", "M"], "there is no command 'chek'; did you mean 'check'?"),
     "a file": (["ball.ply"], "write: meshsdf info ball.ply"),
-    "far off": (["qqq"], "there are check, convert, mesh, roundtrip, compare, info, demo"),
+    "far off": (["qqq"], f"there are {', '.join(COMMANDS)}"),
 }
 
 

@@ -1,0 +1,61 @@
+"""Headers whose values stand in a file beside them."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath, PureWindowsPath
+
+from ..errors import IoError
+from .atomic import atomic_write, check_output
+from .registry import checked_input
+from .vdb_stream import UnsuitedError, printable
+
+
+def data_beside(header: Path, name: str) -> Path:
+    """The file that a header names, in its own folder or below.
+
+    Raises
+    ------
+    UnsuitedError
+        It would lie elsewhere: a header from somebody else could name any file.
+    IoError
+        There is no such file.
+    """
+    name = name.strip()
+    windows, posix = PureWindowsPath(name), PurePosixPath(name)
+    if not name or not name.isprintable():
+        raise ValueError(f"it names the data file '{printable(name)}'")
+    if windows.anchor or posix.anchor or ".." in windows.parts:
+        raise UnsuitedError(
+            f"it names the data file {name!r}, which is not in its folder",
+            "put that file beside the header, and write its bare name there",
+        )
+    return checked_input(header.parent / name)
+
+
+def data_name(header: Path, suffix: str) -> Path:
+    """The file for a header's values, of the same stem; IoError if a header cannot name it."""
+    path = header.with_suffix(suffix)
+    if not path.name.isprintable() or path.name != path.name.strip() or "\\" in path.name:
+        what = f"the name {path.name!r} cannot stand in a header"
+        raise IoError(what, f"output {header}", "use letters, digits and spaces within")
+    return path
+
+
+@contextmanager
+def written_together(
+    header: str | os.PathLike, data: str | os.PathLike, force: bool
+) -> Iterator[tuple[Path, Path]]:
+    """Yield two temporary files; the data take their place first, the header last.
+
+    A stop in between leaves no header that names data which are not there.
+
+    Raises
+    ------
+    IoError
+        As `atomic_write`, of either.
+    """
+    check_output(header, force)
+    check_output(data, force)
+    with atomic_write(header, force) as head, atomic_write(data, force) as body:
+        yield head, body
