@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from .implicit import Exactness, Implicit, from_function
     from .io import read_mesh, read_volume, write_mesh, write_volume
     from .mesh import Mesh, TwoSetReport, check
+    from .ray import Camera, frame, render_distances, render_mesh
     from .report import Comparison, Enclosure, RoundTrip, compare, roundtrip
     from .sdf import MeshDistance, mesh_to_band, mesh_to_grid
+    from .spatial import RayHits
     from .surface import (
         Curve,
         Curves,
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
     )
 
 _HOME = {
+    "Camera": "ray",
     "Comparison": "report",
     "Curve": "surface",
     "Curves": "surface",
@@ -62,6 +65,7 @@ _HOME = {
     "MeshPart": "surface",
     "MeshsdfError": "errors",
     "NarrowBand": "grid",
+    "RayHits": "spatial",
     "RoundTrip": "report",
     "TwoSetReport": "mesh",
     "carry": "surface",
@@ -70,6 +74,7 @@ _HOME = {
     "continue_surface": "surface",
     "dual_contouring": "surface",
     "find_seeds": "surface",
+    "frame": "ray",
     "from_function": "implicit",
     "marching_cubes": "surface",
     "marching_cubes_slices": "surface",
@@ -79,6 +84,8 @@ _HOME = {
     "mesh_to_grid": "sdf",
     "read_mesh": "io",
     "read_volume": "io",
+    "render_distances": "ray",
+    "render_mesh": "ray",
     "roundtrip": "report",
     "singular_cells": "surface",
     "write_mesh": "io",
@@ -86,6 +93,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Camera",
     "Comparison",
     "Curve",
     "Curves",
@@ -98,6 +106,7 @@ __all__ = [
     "MeshPart",
     "MeshsdfError",
     "NarrowBand",
+    "RayHits",
     "RoundTrip",
     "TwoSetReport",
     "carry",
@@ -106,6 +115,7 @@ __all__ = [
     "continue_surface",
     "dual_contouring",
     "find_seeds",
+    "frame",
     "from_function",
     "marching_cubes",
     "marching_cubes_slices",
@@ -115,6 +125,8 @@ __all__ = [
     "mesh_to_grid",
     "read_mesh",
     "read_volume",
+    "render_distances",
+    "render_mesh",
     "roundtrip",
     "singular_cells",
     "write_mesh",
