@@ -28,7 +28,7 @@ from ..progress import Progress, silent
 Seeds = Int32[np.ndarray, " seeds"]  # one per point, or none at all
 
 UNIT_ROUNDOFF = 2.0**-53
-ROUNDING = 64 * UNIT_ROUNDOFF  # times (|p - center| + radius of the mesh); see ClosestPoint
+ROUNDING = 160 * UNIT_ROUNDOFF  # times (|p - center| + radius of the mesh); see ClosestPoint
 POINTS_PER_PIECE = 16384  # about 10 ms: often enough for progress and Ctrl-C
 FEWEST_PER_PIECE = 512  # fewer are not worth a thread
 LARGEST = 1e30  # of a coordinate, world units
@@ -82,10 +82,10 @@ class ClosestPoint:
     Notes
     -----
     Accuracy: ``|distance - truth| <= rounding_bound(points)``, which is
-    ``64 u (|p - c| + r)``, u = 2**-53, c the centre of the mesh's box and r half its
-    diagonal: 50 u for the kernel on lengths ``|p - a|, L <= |p - c| + r`` (see
-    `kernels.point_triangle`), 4 u for moving both to the centre, rounded up. Far from the origin
-    nothing else is lost.
+    ``160 u (|p - c| + r)``, u = 2**-53, c the centre of the mesh's box and r half its
+    diagonal: 50 u for the kernel (`kernels.point_triangle`) on ``|p - a| + L``, where
+    ``|p - a| <= |p - c| + r`` and ``L <= 2 r``, 4 u for moving both to the centre, rounded up. Far
+    from the origin nothing else is lost.
     Determinism: the result does not depend on the order of the points, on seeds or on threads.
     Cost: O(m log m) to build, O(log m) per point near the surface; 240 bytes per face.
     Limits: lengths between 1e-30 and 1e30, for the boxes of the tree are float32.
