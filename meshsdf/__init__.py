@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from .errors import MeshsdfError
     from .grid import Grid, NarrowBand
     from .implicit import Exactness, Implicit, from_function
-    from .io import read_mesh, read_volume, write_mesh, write_volume
-    from .mesh import Mesh, TwoSetReport, check
+    from .io import read_mesh, read_volume, write_mesh, write_samples, write_volume
+    from .mesh import Mesh, TwoSetReport, check, sample_surface
     from .ray import Camera, frame, render_distances, render_mesh
     from .report import Comparison, Enclosure, RoundTrip, compare, roundtrip
-    from .sdf import MeshDistance, mesh_to_band, mesh_to_grid
+    from .sdf import MeshDistance, Samples, mesh_to_band, mesh_to_grid, sample_distances
     from .spatial import RayHits
     from .surface import (
         Curve,
@@ -67,6 +67,7 @@ _HOME = {
     "NarrowBand": "grid",
     "RayHits": "spatial",
     "RoundTrip": "report",
+    "Samples": "sdf",
     "TwoSetReport": "mesh",
     "carry": "surface",
     "check": "mesh",
@@ -87,8 +88,11 @@ _HOME = {
     "render_distances": "ray",
     "render_mesh": "ray",
     "roundtrip": "report",
+    "sample_distances": "sdf",
+    "sample_surface": "mesh",
     "singular_cells": "surface",
     "write_mesh": "io",
+    "write_samples": "io",
     "write_volume": "io",
 }
 
@@ -108,6 +112,7 @@ __all__ = [
     "NarrowBand",
     "RayHits",
     "RoundTrip",
+    "Samples",
     "TwoSetReport",
     "carry",
     "check",
@@ -128,8 +133,11 @@ __all__ = [
     "render_distances",
     "render_mesh",
     "roundtrip",
+    "sample_distances",
+    "sample_surface",
     "singular_cells",
     "write_mesh",
+    "write_samples",
     "write_volume",
 ]
 

@@ -37,7 +37,7 @@ FOR_VOLUMES = ("sparse", "grid")
     is_flag=True,
     help="Also store crossings, normals, features, for mesh --method dual-contouring; NPZ, Zarr.",
 )
-@click.option("--grid", help="Which grid of a .vdb or array of a .vti.  [default: the first]")
+@click.option("--grid", help="Which grid of a .vdb, or array of a .vti.  [default: as info says]")
 @click.option(
     "--grids",
     type=Names("surface", "closest", "uv", "Cd"),

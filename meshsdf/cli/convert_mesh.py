@@ -1,6 +1,7 @@
 """A mesh to a volume of exact signed distances."""
 
 from dataclasses import replace
+from functools import partial
 
 from .console import YES, Console, file_size, plural
 
@@ -23,7 +24,7 @@ def convert_mesh(console: Console, mesh: str, out: str, options: dict) -> int:
     options = _possible(console, out, options)
     with console.stage("load"):
         loaded = read_mesh(mesh, warn=console.warn)
-    _check_carried(loaded, options["grids"])
+    _check_carried(loaded, options)
     with console.stage("check"):
         report = check(loaded, self_intersections=False)
         size = resolve_voxel_size(loaded, resolution, voxel_size)
@@ -37,9 +38,11 @@ def convert_mesh(console: Console, mesh: str, out: str, options: dict) -> int:
         "max_memory": options["max_memory"],
         "progress": console.progress,
     }
-    volume = _measured(console, loaded, options, measuring)
+    measured = volume = _measured(console, loaded, options, measuring)
+    if options["grids"] and not options["closest"]:
+        volume = replace(measured, closest_face=None, barycentric=None)
     with console.stage("write"):
-        _write(console, out, loaded, volume, options)
+        _write(console, out, volume, options, (loaded, measured))
     _tell(console, volume, choice, report, asks_hermite=options["hermite"])
     facts = volume.facts()
     seconds = console.timings(*_STAGES)
@@ -50,7 +53,7 @@ def convert_mesh(console: Console, mesh: str, out: str, options: dict) -> int:
         {"input": mesh, "output": out, "bytes": n_bytes}
         | facts
         | {"sign": volume.sign, "sign_reason": choice.reason}
-        | ({"grids": list(options["grids"])} if options["grids"] else {})
+        | ({"grids": ["surface", *_carried(options)]} if options["grids"] else {})
         | {"seconds": seconds, "warnings": console.warnings}
     )
     return YES
@@ -79,41 +82,33 @@ def _measured(console: Console, mesh, options: dict, measuring: dict):
     return band
 
 
-def _write(console: Console, out: str, mesh, volume, options: dict) -> None:
+def _write(console: Console, out: str, volume, options: dict, carried: tuple) -> None:
+    """Write the volume; ``carried`` is the mesh and its band, of which other grids are made."""
     from ..io import write_volume
 
+    half, force = options["half"], options["force"]
     if options["grids"]:
         from ..io.vdb_carried import write_vdb_carried
         from ..surface.carried_voxels import carried_in_bricks
 
-        def carried(name: str, slots):
-            return carried_in_bricks(mesh, volume, name, slots)
-
-        names = [name for name in ("closest", "uv", "Cd") if name in options["grids"]]
-        write_vdb_carried(
-            out,
-            volume if options["closest"] else replace(volume, closest_face=None, barycentric=None),
-            {name: lambda slots, name=name: carried(name, slots) for name in names},
-            half=options["half"],
-            force=options["force"],
-            **options["writer"],
-        )
+        vectors = {name: partial(carried_in_bricks, *carried, name) for name in _carried(options)}
+        write_vdb_carried(out, volume, vectors, half=half, force=force, **options["writer"])
         return
-    write_volume(
-        out,
-        volume,
-        half=options["half"],
-        force=options["force"],
-        warn=console.warn,
-        options=options["writer"],
-    )
+    writer = options["writer"]
+    write_volume(out, volume, half=half, force=force, warn=console.warn, options=writer)
 
 
-def _check_carried(mesh, grids: tuple[str, ...] | None) -> None:
-    if grids:
-        from ..surface.carried_voxels import require_carried
+def _carried(options: dict) -> list[str]:
+    """Names of the grids beside the surface, in the order in which they are written."""
+    from ..surface.carried_voxels import CARRIED_VOXELS
 
-        require_carried(mesh, [name for name in grids if name != "surface"])
+    return [name for name in CARRIED_VOXELS if name in (options["grids"] or ())]
+
+
+def _check_carried(mesh, options: dict) -> None:
+    from ..surface.carried_voxels import require_carried
+
+    require_carried(mesh, _carried(options))
 
 
 def _tell(console: Console, volume, choice, report, *, asks_hermite: bool) -> None:

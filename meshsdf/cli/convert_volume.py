@@ -1,5 +1,7 @@
 """A volume to another format, or another form."""
 
+from dataclasses import replace
+
 from .console import YES, Console, plural
 from .convert_mesh import volume_words
 
@@ -28,10 +30,12 @@ def convert_volume(console: Console, source: str, out: str, options: dict) -> in
     require_accepted(losses, out, force=force, warn=console.warn)
     with console.stage("convert"):
         volume = _formed(console, volume, options, is_dense=is_dense)
+        volume = _without_lost(volume, target.holds)
+    facts = volume.facts()
     writer = options["writer"] | _naming(console, target, name, grid_class, is_dense=is_dense)
     with console.stage("write"):
         _write(console, out, volume, options, writer)
-    facts, n_bytes = volume.facts(), stored_bytes(out)
+    n_bytes = stored_bytes(out)
     seconds = console.timings("load", "convert", "write")
     words = volume_words(out, facts, n_bytes, seconds["total"])
     console.result(f"{source}: {told['kind'].replace('_', ' ')}\n{words}")
@@ -82,7 +86,7 @@ def _is_dense(volume, target, options: dict, grid_class: str) -> bool:
 def _formed(console: Console, volume, options: dict, *, is_dense: bool):
     """The volume as a full grid, or as a band."""
     from ..grid import NarrowBand
-    from ..grid.cut_band import cut_band
+    from ..grid.cut_band import cut_band, reaches_border
     from ..io.dense_form import full_grid
 
     is_band = isinstance(volume, NarrowBand)
@@ -96,10 +100,27 @@ def _formed(console: Console, volume, options: dict, *, is_dense: bool):
         band = cut_band(volume, options["half_width"])
         n = plural(volume.values.size - band.n_active, "node")
         console.warn(f"beyond {band.half_width:g} voxels only the side is kept, of {n}")
+        if reaches_border(volume):
+            console.warn("the inside reaches the border of the grid; beyond it all is outside now")
         return band
     if options["sparse"]:
         console.warn("it is a narrow band already; written as it is")
     return volume
+
+
+def _without_lost(volume, holds: frozenset[str]):
+    """The volume without what the format has no place for, whose loss is accepted by now."""
+    from ..grid import NarrowBand
+
+    if not isinstance(volume, NarrowBand):
+        return volume
+    fields = {
+        "closest": ("closest_face", "barycentric"),
+        "hermite": ("hermite",),
+        "uncertain": ("uncertain",),
+    }
+    lost = [name for word, names in fields.items() if word not in holds for name in names]
+    return replace(volume, **dict.fromkeys(lost))
 
 
 def _naming(console: Console, target, name: str | None, grid_class: str, *, is_dense: bool) -> dict:

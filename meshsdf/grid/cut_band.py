@@ -10,6 +10,12 @@ from .grid import Grid
 
 LEAST_HALF_WIDTH = 1.0
 
+_SIDES = [
+    tuple(end if axis == other else slice(None) for other in range(3))
+    for axis in range(3)
+    for end in (0, -1)
+]
+
 
 def cut_band(grid: Grid, half_width: Number | None = None) -> NarrowBand:
     """Keep the nodes nearer to the surface than a half width, and the side of all others.
@@ -75,6 +81,12 @@ def cut_band(grid: Grid, half_width: Number | None = None) -> NarrowBand:
         grid.sign,
         n_inner_faces=grid.n_inner_faces,
     )
+
+
+def reaches_border(grid: Grid) -> bool:
+    """Whether a node on the border of a grid is inside."""
+    sides = (grid.values[side] for side in _SIDES if all(grid.values.shape))
+    return any(bool((side < 0).any()) for side in sides)
 
 
 def _check(grid: Grid, half_width: float) -> None:

@@ -82,7 +82,7 @@ def asked_losses(path: str | os.PathLike, **asked: bool) -> dict[str, str]:
 
 
 def file_losses(facts: Mapping, chosen: str | None, *, is_named: bool) -> list[str]:
-    """Return a sentence for what else stands in a file of several grids.
+    """Return a sentence for what of a file is not read: other grids, digits.
 
     Parameters
     ----------
@@ -93,10 +93,12 @@ def file_losses(facts: Mapping, chosen: str | None, *, is_named: bool) -> list[s
     is_named : bool
         Whether the user chose it; then the others are not meant.
     """
-    if is_named:
-        return []
+    sentences = []
     if "grids" in facts:
         chosen = facts.get("default_grid") if chosen is None else chosen
+        doubles = [g for g in facts["grids"] if g["name"] == chosen and g.get("type") == "double"]
+        if doubles:
+            sentences.append(f"the 64-bit values of the grid {chosen!r} are rounded to 32 bits")
         others = [
             f"'{grid['name']}' ({grid['type']})"
             for grid in facts["grids"]
@@ -104,9 +106,12 @@ def file_losses(facts: Mapping, chosen: str | None, *, is_named: bool) -> list[s
         ]
     else:
         others = [f"'{name}'" for name in facts.get("arrays", []) if name != facts.get("array")]
-    if not others:
-        return []
-    return [f"one grid is converted, so {', '.join(others)} would be left out; choose with --grid"]
+    if others and not is_named:
+        listed = ", ".join(others)
+        sentences.append(
+            f"one grid is converted, so {listed} would be left out; choose with --grid"
+        )
+    return sentences
 
 
 def require_accepted(

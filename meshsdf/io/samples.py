@@ -92,7 +92,7 @@ def write_samples(
     Examples
     --------
     >>> import tempfile
-    >>> from meshsdf import sample_distances
+    >>> from meshsdf.sdf import sample_distances
     >>> from meshsdf.mesh.primitives import icosphere
     >>> path = tempfile.mkdtemp() + "/ball.npz"
     >>> write_samples(path, sample_distances(icosphere(), 1000), layout="deepsdf")

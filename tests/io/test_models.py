@@ -1,6 +1,5 @@
 """Real files made by others: what each holds, as its folder's README states it."""
 
-
 import numpy as np
 import pytest
 import trimesh

@@ -8,7 +8,7 @@ from meshsdf.errors import IoError
 from meshsdf.grid import Grid
 from meshsdf.io import check_input, read_volume, write_volume
 from meshsdf.io.registry import FORMATS, format_of, kind_of, suffixes
-from meshsdf.io.volumes import probe_volume
+from meshsdf.io.volumes import check_volume_output, probe_volume
 
 
 def test_every_format_names_functions_that_exist():
@@ -59,6 +59,32 @@ def test_volumes_pass_through_by_suffix(tmp_path):
     assert probe_volume(path)["dtype"] == "float16"
     with pytest.raises(IoError, match="the output exists"):
         write_volume(path, Grid(np.ones((2, 2, 2)), 1.0, np.zeros(3)))
+
+
+def test_a_writer_takes_its_own_options_and_no_others(tmp_path):
+    path, grid = tmp_path / "a.vdb", Grid(np.ones((2, 2, 2), np.float32), 1.0, np.zeros(3))
+    write_volume(path, grid, options={"compression": "zip", "name": "torso"})
+    (facts,) = probe_volume(path)["grids"]
+    assert (facts["name"], facts["compression"]) == ("torso", "zip + active values")
+    with pytest.raises(IoError, match="format 'NPZ volume' have no option 'compression'"):
+        write_volume(tmp_path / "a.npz", grid, options={"compression": "zip"})
+    assert not (tmp_path / "a.npz").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "beside"),
+    [("a.raw", "a.json"), ("a.exr", "a.json"), ("a.nhdr", "a.raw.gz"), ("a.mhd", "a.zraw")],
+)
+def test_files_beside_an_output_are_judged_with_it(tmp_path, name, beside):
+    grid = Grid(np.ones((2, 2, 2), np.float32), 1.0, np.zeros(3))
+    write_volume(tmp_path / name, grid)
+    assert (tmp_path / beside).is_file()
+    check_volume_output(tmp_path / name, force=True)
+    (tmp_path / name).unlink()
+    with pytest.raises(IoError, match="the output exists"):
+        check_volume_output(tmp_path / name)
+    with pytest.raises(IoError, match="that is a mesh"):
+        check_volume_output(tmp_path / "a.ply")
 
 
 def test_an_input_is_judged_before_it_is_read(tmp_path):

@@ -13,6 +13,7 @@ from meshsdf.mesh.measures import (
     euler_number,
     face_areas,
     face_normals,
+    genus,
     is_watertight,
     n_boundary_loops,
     n_components,
@@ -178,3 +179,19 @@ def test_edges_that_shrank_to_a_point_change_no_count_of_the_welded_shape():
     joined = welded(Mesh(vertices, ball.faces))
     assert joined.n_faces == ball.n_faces - 2
     assert (euler_number(joined), n_components(joined), is_watertight(joined)) == (2, 1, True)
+
+
+def test_genus_counts_the_handles_of_all_components():
+    ring = torus(1.0, 0.3, n_major=12, n_minor=8)
+    assert genus(icosphere(2.0, subdivisions=2)) == 0
+    assert genus(ring) == 1
+    assert genus(joined(ring, box_mesh(), ring)) == 2
+    assert genus(Mesh(ring.vertices, ring.faces[1:])) is None
+
+
+def test_bodies_that_touch_at_a_vertex_keep_their_own_genus():
+    # The far corner of one box is the near corner of the other: one vertex, two fans
+    two = welded(joined(box_mesh(), box_mesh(center=(1.0, 1.0, 1.0))))
+    assert two.n_vertices == 15
+    assert is_watertight(two)
+    assert genus(two) == 0

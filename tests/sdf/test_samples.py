@@ -8,9 +8,10 @@ import pytest
 from scipy import stats
 
 from meshsdf.errors import MemoryLimitError, SdfError
-from meshsdf.mesh import Mesh, box_mesh, icosphere, torus
+from meshsdf.mesh import Mesh, box_mesh, check, icosphere, torus
 from meshsdf.sdf import deepsdf_counts, normalization, sample_distances
 from meshsdf.sdf.samples import KINDS, VARIANCES
+from tests.mesh.test_crack_repair import cracked
 
 SURPRISE = 1e-3
 """A right sampler fails one such test in a thousand seeds; the seeds here are fixed."""
@@ -199,6 +200,18 @@ def test_doubtful_sides_of_open_meshes_are_counted():
     assert f"{n} samples: the side is not certain" in found.warnings
     assert any("hole" in warning for warning in found.warnings)
     assert sample_distances(icosphere(subdivisions=2), 500).n_uncertain == 0
+
+
+def test_samples_nearer_than_zipped_cracks_are_wide_are_counted():
+    mesh = cracked(1e-3)
+    beyond = check(mesh, self_intersections=False).repair.certain_beyond
+    found = sample_distances(mesh, {"near": 20_000}, variances=(1e-4,), is_double=True)
+    squares, _, _ = igl.point_mesh_squared_distance(
+        found.points, mesh.vertices, mesh.faces.astype(np.int64)
+    )
+    n = int((np.sqrt(squares) <= beyond).sum())
+    assert 100 < n < 19_000
+    assert found.n_uncertain == n
 
 
 def test_faces_inside_a_union_get_the_distance_to_its_boundary():
