@@ -1,5 +1,8 @@
 """``meshsdf roundtrip``: mesh to volume to mesh, and the loss."""
 
+import os
+import shlex
+
 import click
 
 from .console import NO, YES, Console
@@ -8,6 +11,7 @@ from .options import (
     Names,
     PositiveNumber,
     Resolutions,
+    force_option,
     half_width_option,
     json_option,
     max_memory_option,
@@ -16,7 +20,9 @@ from .options import (
 )
 
 
-@click.command(epilog="Example: meshsdf roundtrip bunny.obj --resolution 64,128,256")
+@click.command(
+    epilog="Example: meshsdf roundtrip bunny.obj --resolution 64,128 --report bunny.html"
+)
 @click.argument("mesh", type=path)
 @click.option(
     "--resolution",
@@ -45,9 +51,21 @@ from .options import (
     help="Double the last resolution until the largest distance is below, world units; "
     "exit 1 if that cannot be.",
 )
+@click.option(
+    "--report",
+    "reports",
+    type=path,
+    multiple=True,
+    help="Also write all of it to a page (.html), a text (.md) or for programs (.json); may be "
+    "given several times.",
+)
+@click.option("--timings", is_flag=True, help="Tell times in the report, which then vary.")
+@force_option
 @max_memory_option
 @json_option
+@click.pass_context
 def command(
+    context: click.Context,
     mesh: str,
     resolutions: tuple[float, ...],
     methods: tuple[str, ...],
@@ -55,6 +73,9 @@ def command(
     sign: str,
     max_error: tuple[float, bool] | None,
     until: float | None,
+    reports: tuple[str, ...],
+    timings: bool,
+    force: bool,
     max_memory: float | None,
     as_json: bool,
 ) -> int:
@@ -71,11 +92,12 @@ def command(
     from ..sdf import choose_sign
 
     check_input(mesh, kind="mesh")
+    _check_reports(reports, force)
     with console.stage("load"):
         loaded = read_mesh(mesh, warn=console.warn)
     with console.stage("check"):
-        report = check(loaded, self_intersections=False)
-        choice = choose_sign(report, sign)
+        found = check(loaded, self_intersections=False)
+        choice = choose_sign(found, sign)
     trip = roundtrip(
         loaded,
         resolutions,
@@ -83,8 +105,9 @@ def command(
         sign=sign,
         half_width=half_width,
         until=until,
-        report=report,
+        report=found,
         max_memory=max_memory,
+        details=bool(reports),
         progress=console.progress,
     )
     last = [trip.last(method) for method in trip.methods]
@@ -92,9 +115,23 @@ def command(
     for warning in dict.fromkeys([*choice.warnings, *warnings]):
         console.warn(warning)
     missed = [sentence for row in last for sentence in _missed(row, max_error, until)]
-    console.result(f"{mesh}: sign by {choice.method} ({choice.reason})\n{roundtrip_table(trip)}")
+    words = f"{mesh}: sign by {choice.method} ({choice.reason})\n{roundtrip_table(trip)}"
+    console.result(words, is_last=not reports)
     for sentence in missed:
         console.say(sentence)
+    if reports:
+        from ..report.report_data import Asked
+
+        asked = Asked(
+            name=os.path.basename(mesh),
+            command=_command(context.params),
+            max_error=_limit(max_error),
+            until=None if until is None else f"{until:g}",
+            missed=tuple(missed),
+            warnings=tuple(console.warnings),
+            seconds=console.timings("load", "check") if timings else None,
+        )
+        _write_reports(reports, force, console, (trip, loaded, found, choice, asked))
     console.json(
         {
             "input": mesh,
@@ -104,6 +141,7 @@ def command(
             "order": trip.order(trip.methods[0]),
             "orders": {method: trip.order(method) for method in trip.methods},
             "passed": not missed,
+            "reports": list(reports),
             "warnings": console.warnings,
             "seconds": console.timings("load", "check"),
         }
@@ -111,14 +149,59 @@ def command(
     return NO if missed else YES
 
 
+def _check_reports(reports: tuple[str, ...], force: bool) -> None:
+    """Refuse before any work starts what could not be written after it."""
+    from ..errors import IoError
+    from ..io import check_output
+    from ..report.formats import format_of
+
+    for name in reports:
+        format_of(name)
+        check_output(name, force)
+    places = [os.path.realpath(name) for name in reports]
+    for i, place in enumerate(places):
+        if place in places[:i]:
+            what = "two reports would be written to one file"
+            raise IoError(what, f"--report {reports[i]}", "name each once")
+
+
+def _write_reports(reports: tuple[str, ...], force: bool, console: Console, facts: tuple) -> None:
+    from ..io import write_text
+    from ..report.formats import render_reports
+
+    with console.stage("report"):
+        texts = render_reports(*facts, names=reports, progress=console.progress)
+        for name, text in texts.items():
+            write_text(name, text, force=force)
+    console.result(", ".join(reports))
+
+
 def _missed(row, max_error: tuple[float, bool] | None, until: float | None) -> list[str]:
     """A sentence for every demand that the last row does not certainly meet."""
     missed = []
     if max_error is not None and not row.is_within(*max_error):
-        unit = "vox" if max_error[1] else ""
-        limit = f"--max-error {max_error[0]:g}{unit}"
+        limit = f"--max-error {_limit(max_error)}"
         missed.append(f"{row.method} at {row.resolution:g}: the error may exceed {limit}")
     if until is not None and not row.is_within(until):
         why = "finer voxels do not help, or do not fit in memory"
         missed.append(f"{row.method} at {row.resolution:g} does not reach --until {until:g}: {why}")
     return missed
+
+
+def _limit(max_error: tuple[float, bool] | None) -> str | None:
+    """As the user wrote it."""
+    return None if max_error is None else f"{max_error[0]:g}{'vox' if max_error[1] else ''}"
+
+
+def _command(options: dict) -> str:
+    """The command line that gives the same numbers, with all that decides them spelled out."""
+    words = ["meshsdf", "roundtrip", options["mesh"]]
+    words += ["--resolution", ",".join(f"{n:g}" for n in options["resolutions"])]
+    words += ["--method", ",".join(options["methods"])]
+    words += ["--half-width", f"{options['half_width']:g}", "--sign", options["sign"]]
+    for name in ("until", "max_memory"):
+        if options[name] is not None:
+            words += [f"--{name.replace('_', '-')}", f"{options[name]:g}"]
+    if options["max_error"] is not None:
+        words += ["--max-error", _limit(options["max_error"])]
+    return shlex.join(words)

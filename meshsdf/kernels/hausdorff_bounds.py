@@ -1,25 +1,32 @@
-"""How far a triangle may be from a mesh: upper bounds from distances at four of its points.
+"""How far a triangle may be from a mesh: upper bounds from the distances at its corners.
 
-A piece is a triangle T with the points 0, 1, 2 (corners) and 3 (centroid), each with its computed
-squared distance d² to the mesh and the slot of its closest face. Four bounds on max over p in T
-of d(p), cheapest first; each stands alone, and the least one is kept:
+A piece is a triangle T whose corners have computed squared distances d² to the mesh and slots of
+their closest faces. Five bounds on max over p in T of d(p), cheapest first; each stands alone, and
+the least one is kept:
 
-1. Lipschitz: d grows at most as fast as p moves. The centroid cuts T into three triangles; every
-   point of one is within its covering radius of one of its corners.
+1. Lipschitz: d grows at most as fast as p moves, and every point of T is within the covering
+   radius of one of its corners.
 2. One face F: distance to one convex set is convex, so max over T = max over corners of d(v, F).
-   Tried for the closest faces of all four points.
-3. Two faces F, G with a common edge e: cut T by a line across two sides. Map the corners to their
-   feet on the nearer of F and G, and the two cuts to points of e. Both parts of T are mapped into
-   one convex face each, linearly on triangles, and |p - map(p)| is convex on each: the largest
-   displacement of a corner or a cut bounds d on T. The cuts are placed where side and e are
-   nearest.
+   Tried for the closest faces of all corners.
+3. Two faces F, G: cut T by a line across two sides, so that corners nearer to F are on one part and
+   corners nearer to G on the other. Each part is convex, so d is at most the largest distance of
+   its corners to its face; a cut counts for both. The cuts are placed where F and G are equally
+   far, which makes the bound tight if no other face is nearer.
 4. A strip: the closest faces of the corners share a vertex w of the mesh. Cut T along the edges
-   passed on the way around w from one corner's face to the next, mapping the cuts as in 3.
+   passed on the way around w from one corner's face to the next. Map the corners to their feet,
+   and each cut to a point of its edge, where both are nearest. Every part of T is then mapped into
+   one convex face, linearly on triangles, and |p - map(p)| is convex on each: the largest
+   displacement of a corner or a cut bounds d on T.
 5. A fan: as 4, but the three sides of T lead once around w: the point y of T nearest to w is
    mapped to w, and T is cut into three from there.
 
 Bounds 2 to 5 see that a flat piece over several coplanar faces has distance zero, which no
 sampling and no Lipschitz argument can.
+
+Rounding: a distance to a face is off as `point_triangle` says; what is added to it here, a radius
+or the length of a displacement, by at most 27 u (R + r), u = 2**-53, for corners of T within R
+and faces within r of the origin. The cuts of 3 to 5 may be misplaced along their segments, which
+leaves a bound a bound.
 
 References: D. Zheng et al. 2022, doi:10.1111/cgf.14612 (bound 2); L. Sacht, A. Jacobson 2024,
 doi:10.1111/cgf.15129 (cascades); Y. Kang et al. 2018 (splitting between two faces).
@@ -31,41 +38,44 @@ from numba import njit
 from .point_triangle import closest_on_triangle, squared_distance
 
 TINY = 1e-300  # keeps a zero length out of a denominator; its numerator is zero too
+MAX_STEPS = 8  # of a search along a side; where it stops, the cut is
+CLOSE = 1e-20  # squared: a gap of this share of the distance is closed
 MAX_FAN = 16  # faces around a vertex, each way; what lies beyond is left to cutting
 FACE, EDGE_FACE, EDGE_END = 0, 1, 2  # rows of a ring
 
 
 @njit(cache=True, nogil=True)
 def upper_bounds(
-    points, squares, slots, pieces, begin, end, enough, frames, corners, order, around, upper
+    points, squares, slots, pieces, begin, end, enough, last, frames, corners, order, around, upper
 ):
-    """``upper[n]`` >= max of d over the piece with points ``pieces[n]`` (4,), begin <= n < end.
+    """``upper[n]`` >= max of d over the piece with corners ``pieces[n]`` (3,), begin <= n < end.
 
-    Cheaper bounds alone decide where they fall to ``enough``. ``around`` (m, 6) holds for every
-    face its vertices and its neighbours over the edges after them, or is empty: no bounds 4, 5.
+    Cheaper bounds alone decide where they fall to ``enough``, and none after bound ``last`` is
+    tried. ``around`` (m, 6) holds for every face its vertices and its neighbours over the edges
+    after them; needed for bounds 4 and 5.
     """
-    candidates = np.empty(4, np.int32)
+    candidates = np.empty(3, np.int32)
     ring = np.empty((3, 2 * MAX_FAN), np.int32)
-    near = np.empty((4, 3))  # squared distance of each candidate face to each corner
+    near = np.empty((3, 3))  # squared distance of each candidate face to each corner
     for n in range(begin, end):
         piece = pieces[n]
         bound = lipschitz_bound(points, squares, piece)
         if bound > enough:
             n_candidates = _candidates(piece, slots, candidates)
-            least = bound * bound
+            least, enough2 = bound * bound, enough * enough
             for c in range(n_candidates):
                 frame = frames[candidates[c]]
                 for i in range(3):
                     v = points[piece[i]]
                     near[c, i] = squared_distance(frame, v[0], v[1], v[2], np.inf)
                 least = min(least, max(near[c, 0], near[c, 1], near[c, 2]))
-            if least > enough * enough:
+            if least > enough2 and last >= 3:
                 for c in range(n_candidates):
                     for e in range(c + 1, n_candidates):
-                        f, g = corners[order[candidates[c]]], corners[order[candidates[e]]]
-                        found = _two_faces(points, piece, near[c], near[e], f, g, least)
+                        f, g = frames[candidates[c]], frames[candidates[e]]
+                        found = _two_faces(points, piece, near[c], near[e], f, g, least, enough2)
                         least = min(least, found)
-            if least > enough * enough and len(around) > 0:
+            if least > enough2 and last >= 5:
                 least = _fan(points, squares, slots, piece, corners, order, around, ring, least)
             bound = np.sqrt(least)
         upper[n] = bound
@@ -73,28 +83,25 @@ def upper_bounds(
 
 @njit(cache=True, nogil=True)
 def lipschitz_bound(points, squares, piece):
-    """Bound 1: the largest of d + covering radius over the triangles (v_i, v_j, centroid)."""
-    bound = 0.0
-    c = points[piece[3]]
-    for i in range(3):
-        v, w = points[piece[i]], points[piece[(i + 1) % 3]]
-        vc, wc, vw = _distance2(v, c), _distance2(w, c), _distance2(v, w)
-        if vc + wc <= vw:
-            # Obtuse at c: farthest is a point of vw, on the bisector of vc or of wc
-            radius = max(vc / max(vw + vc - wc, TINY), wc / max(vw + wc - vc, TINY))
-            radius = min(radius, 0.5) * np.sqrt(vw)
-        else:
-            radius = np.sqrt(max(vc, wc, vw) / 3.0)  # Jung's theorem
-        d = max(squares[piece[i]], squares[piece[(i + 1) % 3]], squares[piece[3]])
-        bound = max(bound, np.sqrt(d) + radius)
-    return bound
+    """Bound 1: the largest distance of a corner, and the covering radius of the triangle."""
+    a, b, c = points[piece[0]], points[piece[1]], points[piece[2]]
+    ab, bc, ca = _distance2(a, b), _distance2(b, c), _distance2(c, a)
+    longest, shortest = max(ab, bc, ca), min(ab, bc, ca)
+    middle = max(min(ab, bc), min(max(ab, bc), ca))
+    if middle + shortest <= longest:
+        # Obtuse: the farthest point is where the bisector of the middle side meets the longest
+        radius = middle / max(longest + middle - shortest, TINY) * np.sqrt(longest)
+    else:
+        radius = np.sqrt(longest / 3.0)  # acute: the circumradius is at most that (Jung)
+    d = max(squares[piece[0]], squares[piece[1]], squares[piece[2]])
+    return np.sqrt(d) + radius
 
 
 @njit(cache=True, nogil=True)
 def _candidates(piece, slots, faces):
-    """Slots of the different closest faces of the piece's points, at most four; their number."""
+    """Slots of the different closest faces of the piece's corners, at most three; their number."""
     n = 0
-    for i in range(4):
+    for i in range(3):
         slot = slots[piece[i]]
         known = False
         for c in range(n):
@@ -106,8 +113,8 @@ def _candidates(piece, slots, faces):
 
 
 @njit(cache=True, nogil=True)
-def _two_faces(points, piece, near_f, near_g, f, g, least):
-    """Bound 3, squared, for the triangles f and g (3, 3); infinite where it does not apply."""
+def _two_faces(points, piece, near_f, near_g, f, g, least, enough):
+    """Bound 3, squared, for the frames f and g; infinite where it does not apply or help."""
     largest, n_f, side = 0.0, 0, 0
     for i in range(3):
         largest = max(largest, min(near_f[i], near_g[i]))
@@ -117,21 +124,52 @@ def _two_faces(points, piece, near_f, near_g, f, g, least):
     if largest >= least or n_f == 0 or n_f == 3:
         return np.inf
     alone = side if n_f == 1 else 3 - side
-    # The common edge, by position: soups count too
-    n_common, a, b = 0, 0, 0
-    for i in range(3):
-        for j in range(3):
-            if f[i, 0] == g[j, 0] and f[i, 1] == g[j, 1] and f[i, 2] == g[j, 2]:
-                n_common += 1
-                a, b = b, i
-                break
-    if n_common != 2:
-        return np.inf
-    v = points[piece[alone]]
+    if n_f == 2:
+        near_f, near_g, f, g = near_g, near_f, g, f
+    v = piece[alone]
     for i in range(1, 3):
-        w = points[piece[(alone + i) % 3]]
-        largest = max(largest, _segments2(v, w, f[a], f[b], 0.0)[0])
+        k = (alone + i) % 3
+        begin, end = (near_f[alone], near_g[alone]), (near_f[k], near_g[k])
+        found = _balance2(points[v], points[piece[k]], begin, end, f, g, max(largest, enough))
+        largest = max(largest, found)
+        if largest >= least:
+            return np.inf
     return largest
+
+
+@njit(cache=True, nogil=True)
+def _balance2(p, q, at_p, at_q, f, g, enough):
+    """Least squared distance found of a point of pq to the farther of f and g.
+
+    ``at_p`` and ``at_q`` are the squared distances of the ends to f and g; p is nearer to f, q to
+    g, so somewhere between both are equal: there by the rule of false position, Illinois variant.
+    """
+    least = min(max(at_p[0], at_p[1]), max(at_q[0], at_q[1]))
+    low, gap_low = 0.0, np.sqrt(at_p[0]) - np.sqrt(at_p[1])
+    high, gap_high = 1.0, np.sqrt(at_q[0]) - np.sqrt(at_q[1])
+    last = 0
+    for _ in range(MAX_STEPS):
+        if least <= enough or gap_high <= gap_low:
+            break
+        share = min(max((low * gap_high - high * gap_low) / (gap_high - gap_low), low), high)
+        x = p[0] + share * (q[0] - p[0])
+        y = p[1] + share * (q[1] - p[1])
+        z = p[2] + share * (q[2] - p[2])
+        to_f = squared_distance(f, x, y, z, np.inf)
+        to_g = squared_distance(g, x, y, z, np.inf)
+        least = min(least, max(to_f, to_g))
+        gap = np.sqrt(to_f) - np.sqrt(to_g)
+        if gap * gap <= CLOSE * least:
+            break
+        if gap < 0.0:
+            low, gap_low = share, gap
+            gap_high *= 0.5 if last < 0 else 1.0
+            last = -1
+        else:
+            high, gap_high = share, gap
+            gap_low *= 0.5 if last > 0 else 1.0
+            last = 1
+    return least
 
 
 @njit(cache=True, nogil=True)

@@ -1,13 +1,16 @@
 """How far apart are two meshes, and what else changed: sizes, pieces, holes."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
+from ..arrays import Number
 from ..errors import ReportError
 from ..mesh import Mesh
 from ..mesh.measures import (
     area,
     euler_number,
+    genus,
     is_watertight,
+    n_boundary_loops,
     n_components,
     volume,
     welded,
@@ -15,6 +18,8 @@ from ..mesh.measures import (
 from ..progress import Progress, silent
 from .enclosure import Enclosure, ceil_digits, floor_digits
 from .hausdorff import OneSided, hausdorff
+from .statistics import Statistics, one_sided_statistics
+from .tolerance import Tolerance
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,10 @@ class Measures:
         Square world units.
     volume : float or None
         Cubic world units; None unless the mesh is watertight once equal positions are joined.
+    genus : int or None
+        Handles of all components together; None unless watertight likewise.
+    n_boundary_loops : int
+        Connected pieces of edges with one face.
     """
 
     n_vertices: int
@@ -36,6 +45,8 @@ class Measures:
     euler_number: int
     n_components: int
     is_watertight: bool
+    genus: int | None
+    n_boundary_loops: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +58,17 @@ class Comparison:
     distance : Enclosure
         The symmetric Hausdorff distance, world units.
     forward, backward : OneSided
-        From A to B, and from B to A.
+        From A to B, and from B to A; with statistics, ``mean`` and ``rms`` are the middles of
+        their intervals.
     before, after : Measures
         Of A and of B.
     diagonal : float
         Of A's box, world units.
     voxel_size : float or None
         World units, if the caller gave one.
+    forward_statistics, backward_statistics : Statistics or None
+        Certified means and percentiles, and lost parts if there is a voxel size; None if they were
+        not asked for, or the source has no area.
     """
 
     distance: Enclosure
@@ -63,6 +78,8 @@ class Comparison:
     after: Measures
     diagonal: float
     voxel_size: float | None = None
+    forward_statistics: Statistics | None = None
+    backward_statistics: Statistics | None = None
 
     def in_voxels(self, length: float) -> float | None:
         """A length in voxels, or None where no voxel size is known."""
@@ -76,8 +93,8 @@ class Comparison:
         """Return plain types: distances in world units, and the largest also in other units."""
         answer = {
             "hausdorff": asdict(self.distance),
-            "forward": _side(self.forward),
-            "backward": _side(self.backward),
+            "forward": _side(self.forward, self.forward_statistics),
+            "backward": _side(self.backward, self.backward_statistics),
             "diagonal": self.diagonal,
             "hausdorff_percent_of_diagonal": self._in_unit(self.in_percent),
             "measures": {"a": asdict(self.before), "b": asdict(self.after)},
@@ -102,12 +119,8 @@ class Comparison:
         rows = [
             ("largest, at least", self.distance.lower, floor_digits),
             ("largest, at most", self.distance.upper, ceil_digits),
-            ("A to B, mean", self.forward.mean, _number),
-            ("A to B, rms", self.forward.rms, _number),
-            ("A to B, at most", self.forward.distance.upper, ceil_digits),
-            ("B to A, mean", self.backward.mean, _number),
-            ("B to A, rms", self.backward.rms, _number),
-            ("B to A, at most", self.backward.distance.upper, ceil_digits),
+            *_side_rows("A to B", self.forward, self.forward_statistics),
+            *_side_rows("B to A", self.backward, self.backward_statistics),
         ]
         lines = [_row("distance", *(name for name, _ in units))]
         for name, length, write in rows:
@@ -133,6 +146,8 @@ class Comparison:
             "euler_number": "Euler number",
             "n_components": "components",
             "is_watertight": "watertight",
+            "genus": "genus",
+            "n_boundary_loops": "boundary loops",
         }
         before, after = asdict(self.before), asdict(self.after)
         rows = [(label, before[name], after[name]) for name, label in names.items()]
@@ -144,7 +159,9 @@ def compare(
     b: Mesh,
     *,
     voxel_size: float | None = None,
-    tolerance: float | None = None,
+    tolerance: Number | Tolerance | None = None,
+    time_budget: Number | None = None,
+    statistics: bool = True,
     progress: Progress = silent,
 ) -> Comparison:
     """Measure how far two meshes are apart, with proof, and what else differs.
@@ -155,8 +172,13 @@ def compare(
         At least one face each.
     voxel_size : float, optional
         Express lengths in voxels of this size too, world units.
-    tolerance : float, optional
+    tolerance : float or Tolerance, optional
         Width asked of the enclosures, world units; see `one_sided_hausdorff` for the default.
+    time_budget : float, optional
+        Seconds after which the enclosures of the largest distance stay as wide as they are.
+    statistics : bool
+        Enclose means and percentiles as well (`one_sided_statistics`, to its own tolerance), and
+        look for lost parts if there is a voxel size; otherwise mean and rms are estimates.
     progress : Progress
         Called between pieces of work.
 
@@ -172,16 +194,39 @@ def compare(
     if voxel_size is not None and not voxel_size > 0:
         what = f"the voxel size is {voxel_size:g}"
         raise ReportError(what, "compare(voxel_size=...)", "pass a positive length")
-    found = hausdorff(a, b, tolerance=tolerance, progress=progress)
+    limits = {"tolerance": tolerance, "time_budget": time_budget, "progress": progress}
+    is_flat = area(a) == 0 or area(b) == 0
+    found = hausdorff(a, b, means=is_flat or not statistics, **limits)
+    forward = backward = None
+    if statistics:
+        forward = _statistics(a, b, voxel_size, progress)
+        backward = _statistics(b, a, voxel_size, progress)
     return Comparison(
         found.distance,
-        found.forward,
-        found.backward,
+        _with_means(found.forward, forward),
+        _with_means(found.backward, backward),
         _measures(a),
         _measures(b),
         a.box.diagonal,
         voxel_size,
+        forward,
+        backward,
     )
+
+
+def _statistics(
+    source: Mesh, target: Mesh, voxel_size: float | None, progress: Progress
+) -> Statistics | None:
+    if area(source) == 0:
+        return None
+    return one_sided_statistics(source, target, voxel_size=voxel_size, progress=progress)
+
+
+def _with_means(side: OneSided, found: Statistics | None) -> OneSided:
+    """Certified middles in place of estimates."""
+    if found is None:
+        return side
+    return replace(side, mean=found.mean.middle, rms=found.rms.middle)
 
 
 def _measures(mesh: Mesh) -> Measures:
@@ -195,16 +240,38 @@ def _measures(mesh: Mesh) -> Measures:
         euler_number=euler_number(joined),
         n_components=n_components(joined),
         is_watertight=closed,
+        genus=genus(joined),
+        n_boundary_loops=n_boundary_loops(joined),
     )
 
 
-def _side(side: OneSided) -> dict:
-    return {
+def _side_rows(way: str, side: OneSided, found: Statistics | None) -> list[tuple]:
+    """(label, length, how to write it) of one direction."""
+    rows = []
+    for name in ("mean", "rms"):
+        if found is None:
+            rows.append((f"{way}, {name}", getattr(side, name), _number))
+        else:
+            rows += _interval_rows(f"{way}, {name}", getattr(found, name))
+    percentiles = {} if found is None else found.percentiles
+    for percent, enclosure in sorted(percentiles.items()):
+        rows += _interval_rows(f"{way}, {percent:g} %", enclosure)
+    return [*rows, (f"{way}, at most", side.distance.upper, ceil_digits)]
+
+
+def _interval_rows(label: str, found: Enclosure) -> list[tuple]:
+    return [(f"{label} >=", found.lower, floor_digits), (f"{label} <=", found.upper, ceil_digits)]
+
+
+def _side(side: OneSided, statistics: Statistics | None) -> dict:
+    more = {} if statistics is None else statistics.to_json()
+    return more | {
         "lower": side.distance.lower,
         "upper": side.distance.upper,
         "mean": side.mean,
         "rms": side.rms,
         "witness": side.witness.tolist(),
+        "nearest": side.nearest.tolist(),
         "source_face": side.source_face,
         "target_face": side.target_face,
         "n_evaluations": side.n_evaluations,
@@ -221,4 +288,4 @@ def _number(value: float | int | bool | None) -> str:
 
 
 def _row(name: str, *cells: str) -> str:
-    return f"{name:<18}" + "".join(f"{cell:>16}" for cell in cells)
+    return f"{name:<20}" + "".join(f"{cell:>16}" for cell in cells)

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..sdf.memory import require_memory
 from ..sdf.sign import SignMethod
 from ..surface import default_level, dual_contouring, marching_cubes
 from .compare import Comparison, compare
+from .row_details import RowDetails, row_details
 
 Method = Literal["marching-cubes", "dual-contouring"]
 METHODS = ("marching-cubes", "dual-contouring")
@@ -53,7 +54,9 @@ class RoundTripRow:
     warnings : tuple of str
         What to know about this row.
     seconds : dict
-        Time for distance, surface and compare.
+        Time for distance, surface and compare, and for details where asked.
+    details : RowDetails or None
+        Where the error comes from; None unless asked for, and in all but the finest rows.
     """
 
     resolution: float
@@ -64,6 +67,7 @@ class RoundTripRow:
     sign: str
     warnings: tuple[str, ...]
     seconds: dict[str, float]
+    details: RowDetails | None = None
 
     def is_within(self, limit: Number, in_voxels: bool = False) -> bool:
         """Whether the error is certainly at most ``limit``, in world units or in voxels."""
@@ -127,6 +131,7 @@ def roundtrip(
     until: Number | None = None,
     report: TwoSetReport | None = None,
     max_memory: Number | None = None,
+    details: bool = False,
     progress: Progress = silent,
 ) -> RoundTrip:
     """Convert a mesh to a narrow band and back, and measure what was lost.
@@ -144,6 +149,9 @@ def roundtrip(
     until : float, optional
         World units. Double the last resolution until each method's error is certainly below,
         stops shrinking, or the next one would not fit in memory.
+    details : bool
+        Of the finest row of each method also certify means and percentiles, find thin parts
+        lost, and say where the error comes from (`row_details`); takes several times as long.
 
     Raises
     ------
@@ -170,65 +178,93 @@ def roundtrip(
         "max_memory": max_memory,
         "progress": progress,
     }
-    rows = [row for n in resolutions for row in _rows(mesh, n, methods, options)]
+    work = _Work(mesh, options)
+    rows = [row for n in resolutions for row in work.rows(n, methods)]
     while until is not None:
         resolution = 2 * rows[-1].resolution
         left = [method for method in methods if _can_improve(rows, method, until)]
         if not left:
             break
         try:
-            rows += _rows(mesh, resolution, left, options)
+            rows += work.rows(resolution, left)
         except MemoryLimitError:
             break
+    if details:
+        work.add_details(rows)
     return RoundTrip(tuple(rows))
 
 
-def _rows(
-    mesh: Mesh, resolution: Number, methods: Sequence[Method], options: dict
-) -> list[RoundTripRow]:
-    """One row for every method, from one band."""
-    begin = time.perf_counter()
-    band = mesh_to_band(mesh, resolution=resolution, **options)
-    spent = time.perf_counter() - begin
-    return [_row(mesh, float(resolution), band, spent, method, options) for method in methods]
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What all rows have in common."""
 
+    mesh: Mesh
+    options: dict  # of mesh_to_band
 
-def _row(
-    mesh: Mesh, resolution: float, band: NarrowBand, spent: float, method: Method, options: dict
-) -> RoundTripRow:
-    marks = [time.perf_counter()]
-    level, warnings = default_level(band)
-    if method == "marching-cubes":
-        surface = marching_cubes(band, level=level, progress=options["progress"])
-    else:
-        surface = dual_contouring(band, mesh, level=level, progress=options["progress"])
-    marks.append(time.perf_counter())
-    comparison = None
-    needed = BYTES_PER_FACE * (mesh.n_faces + surface.n_faces)
-    where = f"roundtrip(resolution={resolution:g}): {surface.n_faces:,} faces to compare"
-    require_memory(needed, options["max_memory"], where=where)
-    if surface.n_faces:
-        comparison = compare(
-            mesh,
+    @property
+    def progress(self) -> Progress:
+        return self.options["progress"]
+
+    def rows(self, resolution: Number, methods: Sequence[Method]) -> list[RoundTripRow]:
+        """One row for every method, from one band."""
+        begin = time.perf_counter()
+        band = mesh_to_band(self.mesh, resolution=resolution, **self.options)
+        spent = time.perf_counter() - begin
+        return [self._row(float(resolution), band, spent, method) for method in methods]
+
+    def _row(
+        self, resolution: float, band: NarrowBand, spent: float, method: Method
+    ) -> RoundTripRow:
+        marks = [time.perf_counter()]
+        level, warnings = default_level(band)
+        if method == "marching-cubes":
+            surface = marching_cubes(band, level=level, progress=self.progress)
+        else:
+            surface = dual_contouring(band, self.mesh, level=level, progress=self.progress)
+        marks.append(time.perf_counter())
+        comparison = None
+        if surface.n_faces:
+            comparison = self._compared(surface, resolution, band.voxel_size)
+        else:
+            warnings += ("nothing came back: no node is inside, the mesh is thinner than a voxel",)
+        marks.append(time.perf_counter())
+        parts = [round(part, 4) for part in (spent, *np.diff(marks).tolist())]
+        return RoundTripRow(
+            resolution,
+            band.voxel_size,
+            comparison,
+            method,
             surface,
-            voxel_size=band.voxel_size,
-            tolerance=VOXEL_SHARE * band.voxel_size,
-            progress=options["progress"],
+            band.sign,
+            warnings,
+            dict(zip(("distance", "surface", "compare"), parts, strict=True)),
         )
-    else:
-        warnings += ("nothing came back: no node is inside, the mesh is thinner than a voxel",)
-    marks.append(time.perf_counter())
-    parts = [round(part, 4) for part in (spent, *np.diff(marks).tolist())]
-    return RoundTripRow(
-        resolution,
-        band.voxel_size,
-        comparison,
-        method,
-        surface,
-        band.sign,
-        warnings,
-        dict(zip(("distance", "surface", "compare"), parts, strict=True)),
-    )
+
+    def add_details(self, rows: list[RoundTripRow]) -> None:
+        """Put details into the finest row of each method; bands are made again, not kept."""
+        last = {row.method: i for i, row in enumerate(rows) if row.comparison is not None}
+        for resolution in dict.fromkeys(rows[i].resolution for i in last.values()):
+            band = mesh_to_band(self.mesh, resolution=resolution, **self.options)
+            for i in last.values():
+                if rows[i].resolution == resolution:
+                    begin = time.perf_counter()
+                    found = row_details(self.mesh, band, rows[i].surface, progress=self.progress)
+                    spent = round(time.perf_counter() - begin, 4)
+                    seconds = rows[i].seconds | {"details": spent}
+                    rows[i] = replace(rows[i], details=found, seconds=seconds)
+
+    def _compared(self, surface: Mesh, resolution: float, voxel_size: float) -> Comparison:
+        needed = BYTES_PER_FACE * (self.mesh.n_faces + surface.n_faces)
+        where = f"roundtrip(resolution={resolution:g}): {surface.n_faces:,} faces to compare"
+        require_memory(needed, self.options["max_memory"], where=where)
+        return compare(
+            self.mesh,
+            surface,
+            voxel_size=voxel_size,
+            tolerance=VOXEL_SHARE * voxel_size,
+            statistics=False,
+            progress=self.progress,
+        )
 
 
 def _can_improve(rows: Sequence[RoundTripRow], method: str, until: Number) -> bool:

@@ -38,14 +38,14 @@ TARGETS = {
 
 def bounds(target, corners, *, with_fans, enough=0.0):
     closest = ClosestPoint(target)
-    points = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1) - closest.center
-    points = points.reshape(-1, 3)
+    points = (corners - closest.center).reshape(-1, 3)
     squares, slots = closest.search(points, np.empty(0, np.int32))
-    pieces = np.arange(len(points), dtype=np.int32).reshape(-1, 4)
+    pieces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
     around = faces_around(target) if with_fans else np.empty((0, 6), np.int32)
-    known = (closest.frames, closest.corners, closest.face_of_slot, around)
+    last = 5 if with_fans else 3
+    known = (enough, last, closest.frames, closest.corners, closest.face_of_slot, around)
     upper = np.empty(len(pieces))
-    upper_bounds(points, squares, slots, pieces, 0, len(pieces), enough, *known, upper)
+    upper_bounds(points, squares, slots, pieces, 0, len(pieces), *known, upper)
     lipschitz = np.array([lipschitz_bound(points, squares, piece) for piece in pieces])
     return upper, lipschitz
 
@@ -70,6 +70,24 @@ def test_no_sample_of_a_piece_is_beyond_its_bound(name, with_fans):
     assert (seen <= upper + 1e-13).all()
     assert (upper <= lipschitz + 1e-15).all()
     assert (upper < 0.9 * lipschitz).mean() > 0.1
+
+
+def test_a_piece_between_two_faces_apart_gets_the_distance_of_its_farthest_point():
+    # Planes z = 0 and z = 1; on a piece across z = 1/2, that is 1/2 where nothing else is nearer
+    vertices = 50 * np.array([[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]])
+    vertices = np.vstack([vertices, vertices + np.array([0, 0, 1])])
+    target = Mesh(vertices, np.array([[0, 1, 2], [3, 4, 5]], np.int32))
+    rng = np.random.default_rng(5)
+    corners = rng.uniform(-1, 1, (200, 3, 3))
+    corners[:, :, 2] = rng.uniform(0.1, 0.9, (200, 3))
+    upper, lipschitz = bounds(target, corners, with_fans=False)
+    heights = np.sort(corners[:, :, 2], axis=1)
+    across = (heights[:, 0] < 0.5) & (heights[:, 2] > 0.5)
+    assert across.sum() > 100
+    np.testing.assert_allclose(upper[across], 0.5, atol=1e-9)
+    farthest = np.minimum(heights, 1 - heights).max(axis=1)
+    np.testing.assert_allclose(upper[~across], farthest[~across], atol=1e-13)
+    assert (lipschitz[across] > 0.5).all()
 
 
 def test_pieces_of_the_surface_itself_over_one_two_or_a_fan_of_faces_have_bound_zero():

@@ -83,3 +83,35 @@ def test_a_mesh_without_faces_is_refused(a, b, name):
 def test_a_voxel_size_of_zero_is_refused():
     with pytest.raises(ReportError, match="the voxel size is 0"):
         compare(SMALL, LARGE, voxel_size=0.0)
+
+
+def test_statistics_stand_in_place_of_the_estimates():
+    found = compare(SMALL, LARGE)
+    for side, statistics in (
+        (found.forward, found.forward_statistics),
+        (found.backward, found.backward_statistics),
+    ):
+        assert side.mean == statistics.mean.middle
+        assert side.rms == statistics.rms.middle
+    told = json.loads(json.dumps(found.to_json(), allow_nan=False))["forward"]
+    assert told["mean_bounds"]["lower"] <= told["mean"] <= told["mean_bounds"]["upper"]
+    assert told["rms_bounds"]["lower"] <= told["rms"] <= told["rms_bounds"]["upper"]
+    assert list(told["percentiles"]) == ["50", "90", "95", "99"]
+    # All of the small box is 0.1 inside the large one
+    assert found.forward_statistics.mean.contains(0.1)
+    assert found.forward_statistics.signed_mean.contains(-0.1)
+    assert found.forward_statistics.volume_difference == pytest.approx(1 - 1.728)
+
+
+def test_without_statistics_the_means_are_estimates():
+    found = compare(SMALL, LARGE, statistics=False)
+    assert found.forward_statistics is None
+    assert found.forward.mean == pytest.approx(0.1)
+    assert "mean_bounds" not in found.to_json()["forward"]
+    assert "A to B, mean" in found.describe()
+
+
+def test_genus_and_holes_are_counted():
+    found = compare(SMALL, Mesh(LARGE.vertices, LARGE.faces[1:]), statistics=False)
+    assert (found.before.genus, found.before.n_boundary_loops) == (0, 0)
+    assert (found.after.genus, found.after.n_boundary_loops) == (None, 1)

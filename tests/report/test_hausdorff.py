@@ -8,9 +8,10 @@ from meshsdf.errors import ReportError
 from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere, tetrahedron
 from meshsdf.report.hausdorff import hausdorff, one_sided_hausdorff
+from meshsdf.report.tolerance import Tolerance
 from meshsdf.spatial import ClosestPoint
 
-ROUNDING = 1e-12  # 192 u times coordinates below 10, twice, and the closed formula's own
+ROUNDING = 1e-12  # 328 u times coordinates below 10, twice, and the closed formula's own
 
 
 def folded_quad(height, *, along):
@@ -42,16 +43,16 @@ def samples_of(mesh, n, seed):
     return np.einsum("nk,nkx->nx", rng.dirichlet(np.ones(3), n), corners)
 
 
-@pytest.mark.parametrize("height", [0.01, 0.5, 1.0, 3.0])
+@pytest.mark.parametrize("height", [0.01, 0.1, 0.5, 1.0, 2.0, 3.0])
 def test_the_fold_that_fools_vertices_has_the_distance_its_formula_says(height):
     # All four vertices are common, so every maximum over vertices is zero
     one, two = folded_quad(height, along="ac"), folded_quad(height, along="bd")
-    found = hausdorff(one, two, tolerance=1e-9)
+    found = hausdorff(one, two, tolerance=1e-12)
     forward = height / (1 + np.sqrt(1 + 2 * height**2))
     backward = height / (2 * np.sqrt(1 + height**2))
     for side, truth in ((found.forward, forward), (found.backward, backward)):
-        assert side.distance.lower - ROUNDING <= truth <= side.distance.upper + ROUNDING
-        assert side.distance.width <= 1e-9 + ROUNDING
+        assert side.distance.contains(truth)
+        assert side.distance.width <= 1e-12
         assert side.is_within_tolerance
     assert found.distance.contains(max(forward, backward))
 
@@ -138,7 +139,11 @@ def test_no_sample_is_beyond_the_upper_end_and_the_witness_reaches_the_lower(see
         assert own(side.witness[None]).distance[0] < ROUNDING
         there = ClosestPoint(Mesh(target.vertices, target.faces[[side.target_face]]))
         assert there(side.witness[None]).distance[0] <= side.distance.upper
+        assert there(side.nearest[None]).distance[0] < ROUNDING
+        apart = np.linalg.norm(side.witness - side.nearest)
+        assert apart == pytest.approx(witness.distance[0], abs=ROUNDING)
     assert found.distance == found.forward.distance.largest(found.backward.distance)
+    assert found.farthest.distance.lower == found.distance.lower
 
 
 def test_a_smaller_tolerance_narrows_the_interval_inside_the_wider_one():
@@ -154,15 +159,53 @@ def test_a_smaller_tolerance_narrows_the_interval_inside_the_wider_one():
         before = side.distance
 
 
-def test_a_limit_leaves_a_wider_interval_that_is_still_true():
+def test_an_interval_can_be_asked_for_as_a_share_of_itself_or_of_a_voxel():
+    a, b = rough(icosphere(subdivisions=2), 0.05, 0), icosphere(subdivisions=3)
+    share = one_sided_hausdorff(a, b, tolerance=Tolerance(relative=1e-5)).distance
+    assert share.width <= 1e-5 * share.lower
+    voxels = one_sided_hausdorff(a, b, tolerance=Tolerance.in_voxels(0.01, 0.1)).distance
+    assert 1e-5 * share.lower < voxels.width <= 1e-3
+    assert voxels == one_sided_hausdorff(a, b, tolerance=1e-3).distance
+    either = one_sided_hausdorff(a, b, tolerance=Tolerance(absolute=1e-3, relative=1e-5)).distance
+    assert either == voxels
+
+
+@pytest.mark.parametrize("limit", [{"max_evaluations": 0}, {"time_budget": 0.0}])
+def test_a_limit_leaves_a_wider_interval_that_is_still_true(limit):
     one, two = folded_quad(1.0, along="ac"), folded_quad(1.0, along="bd")
-    side = one_sided_hausdorff(one, two, tolerance=1e-9, max_evaluations=10)
+    side = one_sided_hausdorff(one, two, tolerance=1e-9, **limit)
     assert not side.is_within_tolerance
+    assert side.n_evaluations == 4
     assert side.distance.width > 1e-3
     assert side.distance.contains(1 / (1 + np.sqrt(3)))
-    side = one_sided_hausdorff(one, two, tolerance=1e-9, time_budget=0.0)
-    assert not side.is_within_tolerance
-    assert side.distance.contains(1 / (1 + np.sqrt(3)))
+    found = hausdorff(one, two, tolerance=1e-9, **limit)
+    assert found.distance.contains(1 / (1 + np.sqrt(3)))
+    assert not found.backward.is_within_tolerance
+
+
+def test_a_budget_that_lasts_changes_nothing():
+    a, b = rough(icosphere(subdivisions=2), 0.05, 0), icosphere(subdivisions=3)
+    found = hausdorff(a, b, time_budget=1000, max_evaluations=10**6)
+    assert found.distance == hausdorff(a, b).distance
+    assert found.forward.is_within_tolerance
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [({"time_budget": -1.0}, "the limit is -1"), ({"max_evaluations": -5}, "the limit is -5"),
+     ({"time_budget": float("nan")}, "the limit is nan")],
+)  # fmt: skip
+def test_a_limit_below_zero_is_refused(limit, words):
+    with pytest.raises(ReportError, match=words):
+        one_sided_hausdorff(box_mesh(), box_mesh(), **limit)
+
+
+def test_means_can_be_left_out():
+    side = one_sided_hausdorff(icosphere(subdivisions=1), box_mesh(), means=False)
+    assert side.mean is side.rms is None
+    other = one_sided_hausdorff(icosphere(subdivisions=1), box_mesh())
+    assert side.distance == other.distance
+    assert 0 < other.mean < other.rms < other.distance.upper
 
 
 def test_mean_and_rms_are_exact_for_a_triangle_above_a_plane():
@@ -201,6 +244,14 @@ EMPTY = Mesh(np.zeros((3, 3)), np.empty((0, 3), np.int32))
 def test_a_mesh_without_faces_is_refused(a, b, name):
     with pytest.raises(ReportError, match=f"the {name} mesh has no faces"):
         one_sided_hausdorff(a, b)
+
+
+def test_coordinates_that_cannot_be_squared_are_refused():
+    far = placed(box_mesh(), 1e31, 0)
+    with pytest.raises(ReportError, match=r"coordinates of the source mesh reach 5e\+30"):
+        one_sided_hausdorff(far, box_mesh())
+    with pytest.raises(ReportError, match=r"coordinates of the target mesh reach 5e\+30"):
+        one_sided_hausdorff(box_mesh(), far)
 
 
 def test_a_tolerance_of_zero_is_refused():

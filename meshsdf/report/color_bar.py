@@ -1,0 +1,74 @@
+"""The colours of the heat maps and the distances they stand for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Values
+from ..ray import color_map
+from ..srgb import srgb_from_linear
+from .notation import written
+
+LEAST_TOP = 1e-2
+"""In voxels: the scale never ends lower, so that rounding errors do not shine."""
+
+MAP, DARKEST = "cividis", 0.16  # of the map: below, shadows could not be told from colours
+WIDTH, HEIGHT, MARGIN, BAR = 420, 38, 42, 12  # of the drawing, pixels
+N_STOPS = 25
+ROOM = 0.11  # of the bar, between two labels
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Distances in voxels to colours: by their square roots, so that small ones differ too."""
+
+    top: float
+
+    def place(self, voxels: Values) -> Values:
+        """Where on the scale, from 0 to 1."""
+        return np.sqrt(np.minimum(voxels / self.top, 1.0))
+
+    def colors(self, voxels: Values) -> np.ndarray:
+        """(n, 3) linear RGB of (n,) distances in voxels."""
+        return _colors(self.place(voxels))
+
+    @property
+    def ticks(self) -> list[float]:
+        """Round numbers that have room below the top, in voxels."""
+        decade = 10.0 ** np.floor(np.log10(self.top))
+        found = [0.0]
+        for step in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
+            places = self.place(np.array([found[-1], step * decade]))
+            if places[1] - places[0] >= ROOM and places[1] <= 1.0 - 1.5 * ROOM:
+                found.append(float(f"{step * decade:.1g}"))
+        return found
+
+    def bar(self, name: str | int) -> str:
+        """Return the scale as SVG, with its ticks; ``name`` is unique on the page."""
+        places = np.linspace(0.0, 1.0, N_STOPS)
+        encoded = np.rint(255 * srgb_from_linear(_colors(places))).astype(int)
+        stops = "".join(
+            f'<stop offset="{place:.4f}" stop-color="#{r:02x}{g:02x}{b:02x}"/>'
+            for place, (r, g, b) in zip(places, encoded.tolist(), strict=True)
+        )
+        gradient = f'<linearGradient id="colors-{name}">{stops}</linearGradient>'
+        length = WIDTH - 2 * MARGIN
+        place = f'x="{MARGIN}" y="2" width="{length}" height="{BAR}" rx="2"'
+        bar = f'<rect {place} fill="url(#colors-{name})"/>'
+        labels = [written(tick) for tick in self.ticks]
+        values = np.array([*self.ticks, self.top])
+        labels.append(f"{written(self.top, 'up', 3)} voxels")
+        marks = "".join(
+            f'<line x1="{x:.1f}" y1="{BAR + 2}" x2="{x:.1f}" y2="{BAR + 7}"/>'
+            f'<text x="{x:.1f}" y="{BAR + 19}">{label}</text>'
+            for x, label in zip(MARGIN + length * self.place(values), labels, strict=True)
+        )
+        words = f"Colours from 0, dark, to {labels[-1]}, light, by square roots"
+        return (
+            f'<svg class="bar" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{words}">'
+            f"<defs>{gradient}</defs>{bar}{marks}</svg>"
+        )
+
+
+def _colors(places: Values) -> np.ndarray:
+    return color_map(MAP)(DARKEST + (1.0 - DARKEST) * places)

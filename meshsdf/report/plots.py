@@ -1,0 +1,166 @@
+"""The plots of a report, as SVG that lives inside its page.
+
+Everything drawn comes from the report's dict. Colours are the page's own custom properties, so one
+plot suits paper and a dark screen; letters stay letters, in the page's fonts. The same dict gives
+the same bytes: matplotlib's identifiers hang on a fixed salt, and no date is written.
+"""
+
+import io
+import re
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from .notation import written
+from .verdict import METHOD_WORDS
+
+# Stand-ins that matplotlib writes as they are; the page knows them by name
+INK, MUTED, RULE = "#010203", "#040506", "#070809"
+FIRST, SECOND = "#0a0b0c", "#0d0e0f"
+NAMES = {INK: "ink", MUTED: "muted", RULE: "rule", FIRST: "first", SECOND: "second"}
+
+SIZE = 5.4, 3.7  # inches; letters of 10 points are then readable on a telephone as well
+STYLE = {
+    "svg.fonttype": "none",
+    "font.size": 10,
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": MUTED,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "grid.color": RULE,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+}
+
+
+def errors_svg(data: dict) -> str:
+    """Draw distances in voxels and the fitted order against resolution, log-log.
+
+    An empty text if fewer than two resolutions brought something back.
+    """
+    rows = [row for row in data["rows"] if not row["is_empty"]]
+    resolutions = sorted({row["resolution"] for row in rows})
+    if len(resolutions) < 2:
+        return ""
+
+    def draw(axes) -> None:
+        for method, color in zip(data["methods"], (FIRST, SECOND), strict=False):
+            name = f"{METHOD_WORDS[method]}, " if len(data["methods"]) > 1 else ""
+            _method_lines(axes, [row for row in rows if row["method"] == method], color, name)
+        _one_voxel(axes, rows)
+        axes.set_xticks(resolutions, [written(n, digits=6) for n in resolutions])
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.set_xlabel("resolution, voxels along the longest side")
+        axes.set_ylabel("distance, world units")
+        n_columns = 2 if len(data["methods"]) > 1 else 4
+        axes.figure.legend(
+            loc="outside lower center", ncols=n_columns, fontsize=9, columnspacing=1.2
+        )
+
+    return _svg(draw, "errors", "Distances against resolution, both axes logarithmic")
+
+
+def distribution_svg(data: dict, index: int) -> str:
+    """Draw which share of the area is within which distance, both directions of one row.
+
+    The curves are bands: the share lies between their edges. An empty text if it was not measured.
+    """
+    row = data["rows"][index]
+    if row["is_empty"] or row["forward"]["shares"] is None:
+        return ""
+
+    def draw(axes) -> None:
+        sides = (("forward", "mesh → round trip", FIRST), ("backward", "round trip → mesh", SECOND))
+        for side, label, color in sides:
+            shares = row[side]["shares"]
+            voxels = np.array(shares["thresholds"]) / row["voxel_size"]
+            lower, upper = 100 * np.array(shares["lower"]), 100 * np.array(shares["upper"])
+            axes.fill_between(voxels, lower, upper, color=color, alpha=0.25, linewidth=0)
+            axes.plot(voxels, lower, color=color, label=label, linewidth=1.4)
+            axes.plot(voxels, upper, color=color, linewidth=0.7)
+        axes.set_ylim(0, 101)
+        axes.set_xlabel("distance, voxels")
+        axes.set_ylabel("share of the area within, %")
+        axes.legend(loc="lower right", fontsize=9)
+
+    return _svg(draw, f"shares-{index}", "Share of the area within each distance", log="x")
+
+
+def _method_lines(axes, rows: list[dict], color: str, name: str) -> None:
+    """The interval of the largest distance as a band, the mean dashed, the fit thin."""
+    if not rows:
+        return
+    rows = sorted(rows, key=lambda row: row["resolution"])
+    n = np.array([row["resolution"] for row in rows])
+    spans = [row["largest"]["world"] for row in rows]
+    lower = np.array([span["lower"] for span in spans])
+    upper = np.array([span["upper"] for span in spans])
+    mean = np.array([_middle(row["forward"]["mean"]["world"]) for row in rows])
+    axes.fill_between(n, lower, upper, color=color, alpha=0.3, linewidth=0)
+    axes.plot(n, upper, "o-", color=color, label=f"{name}largest", linewidth=1.4, markersize=4)
+    axes.plot(n, mean, "s--", color=color, label=f"{name}mean", linewidth=1, markersize=3)
+    if len(set(n)) > 1 and (lower > 0).all():
+        slope, height = np.polyfit(np.log(n), np.log(lower), 1)
+        label = f"{name}order {written(-float(slope), digits=3)}"
+        axes.plot(n, np.exp(height) * n**slope, color=color, linewidth=0.6, label=label)
+
+
+def _one_voxel(axes, rows: list[dict]) -> None:
+    """The line a distance of one voxel would follow."""
+    pairs = sorted({(row["resolution"], row["voxel_size"]) for row in rows})
+    axes.plot(*zip(*pairs, strict=True), ":", color=MUTED, linewidth=1, label="one voxel")
+
+
+def _middle(span: dict) -> float:
+    """A mean is drawn as one line: its interval is thinner than that."""
+    return span["estimate"] if "estimate" in span else 0.5 * (span["lower"] + span["upper"])
+
+
+def _svg(draw, name: str, title: str, log: str = "xy") -> str:
+    with rc_context(STYLE | {"svg.hashsalt": name}):
+        figure = Figure(figsize=SIZE, layout="constrained")
+        FigureCanvasSVG(figure)
+        axes = figure.add_subplot()
+        if "x" in log:
+            axes.set_xscale("log")
+        if "y" in log:
+            axes.set_yscale("log")
+        draw(axes)
+        for axis, letter in ((axes.xaxis, "x"), (axes.yaxis, "y")):
+            if letter in log and not (letter == "x" and log == "xy"):
+                axis.set_major_locator(LogLocator(subs=(1, 2, 5) if log == "xy" else (1,)))
+                axis.set_major_formatter(FuncFormatter(lambda x, _: written(float(x), digits=2)))
+                axis.set_minor_locator(NullLocator())
+        axes.grid(linewidth=0.7)
+        axes.set_axisbelow(True)
+        file = io.StringIO()
+        figure.savefig(file, format="svg", transparent=True, metadata={"Date": None})
+    return _inline(file.getvalue(), name, title)
+
+
+def _inline(svg: str, name: str, title: str) -> str:
+    """Make a file into a part of a page: own identifiers, the page's colours and fonts."""
+    body = svg[svg.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r"<style[^>]*>.*?</style>", "", body, flags=re.DOTALL)
+    body = re.sub(r'\bid="', f'id="{name}-', body)
+    body = body.replace("url(#", f"url(#{name}-").replace('href="#', f'href="#{name}-')
+    body = re.sub(r"font-family:[^;\"]*;?", "", body)
+    body = re.sub(r"font: ([0-9.]+px)[^;\"]*", r"font-size: \1", body)
+    for stand_in, color in NAMES.items():
+        body = body.replace(stand_in, f"var(--{color})")
+    box = re.search(r'viewBox="([^"]*)"', body)[1]
+    attributes = f'class="plot" viewBox="{box}" role="img" aria-label="{title}"'
+    return re.sub(
+        r"<svg[^>]*>",
+        f'<svg xmlns:xlink="http://www.w3.org/1999/xlink" {attributes}>',
+        body,
+        count=1,
+    ).strip()

@@ -1,0 +1,80 @@
+"""What a round trip did to a mesh, in one sentence per method; written from the report's JSON."""
+
+from .notation import count, place, written
+
+METHOD_WORDS = {"marching-cubes": "marching cubes", "dual-contouring": "dual contouring"}
+SIDES = {"forward": "of the mesh", "backward": "of what came back"}
+
+
+def add_verdicts(data: dict) -> dict:
+    """Return the report with its verdicts in words."""
+    last = [data["rows"][index] for index in data["last_rows"]]
+    sentences = [sentence(data["input"]["name"], row) for row in last]
+    topology = [None if row["is_empty"] else topology_words(row["measures"]) for row in last]
+    for row in data["rows"]:
+        if not row["is_empty"]:
+            row["measures"]["is_topology_kept"] = topology_words(row["measures"])["is_kept"]
+    return data | {"verdict": {"sentences": sentences, "topology": topology}}
+
+
+def sentence(name: str, row: dict) -> str:
+    """Say how far, proved, where, and what became of topology and sharp edges."""
+    how = f"from {written(row['resolution'], digits=6)} voxels by {METHOD_WORDS[row['method']]}"
+    if row["is_empty"]:
+        return f"Nothing of {name} comes back {how}: it is thinner than a voxel there."
+    units = row["largest"]
+    world, voxels, percent = (written(_upper(units[unit]), "up") for unit in units)
+    worst = row[row["worst"]]
+    least = written(worst["maximum"]["world"]["lower"], "down")
+    parts = [
+        f"{name}, brought back {how}, is nowhere farther than {world} ({voxels} voxels, "
+        f"{percent} % of its diagonal) from its round trip, which is proved",
+        f"the worst place is {place(worst['witness'])} on face {written(worst['source_face'])} "
+        f"{SIDES[row['worst']]}, at least {least} away",
+        topology_words(row["measures"])["sentence"],
+    ]
+    if row["sharp_edges"]:
+        parts.append(sharp_words(row["sharp_edges"]))
+    return "; ".join(parts) + "."
+
+
+def topology_words(measures: dict) -> dict:
+    """Whether the counts that make the topology are the same before and after, and which differ."""
+    before, after = measures["before"], measures["after"]
+    known = [
+        (name, before[key], after[key])
+        for name, key in (
+            ("Euler number", "euler_number"),
+            ("components", "n_components"),
+            ("genus", "genus"),
+            ("boundary loops", "n_boundary_loops"),
+        )
+        if before.get(key) is not None and after.get(key) is not None
+    ]
+    changes = [f"{name} {written(old)} → {written(new)}" for name, old, new in known if old != new]
+    same_openness = before["is_watertight"] == after["is_watertight"]
+    if not same_openness:
+        changes.append("open → watertight" if after["is_watertight"] else "watertight → open")
+    if changes:
+        n = measures["n_repeated_places"]
+        if n > 0:
+            share = "1 vertex shares its place" if n == 1 else f"{written(n)} vertices share places"
+            changes.append(f"counted by position: {share}")
+        return {"is_kept": False, "sentence": f"the topology is not kept ({', '.join(changes)})"}
+    facts = [
+        f"Euler number {written(before['euler_number'])}",
+        count(before["n_components"], "component"),
+        "watertight" if before["is_watertight"] else "open",
+    ]
+    return {"is_kept": True, "sentence": f"the topology is kept ({', '.join(facts)})"}
+
+
+def sharp_words(edges: dict) -> str:
+    """How near the sharp edges come back."""
+    n, voxels = edges["n_edges"], written(_upper(edges["largest"]["voxels"]), "up")
+    whose = f"its {written(n)} sharp edges come" if n > 1 else "its one sharp edge comes"
+    return f"{whose} back within {voxels} voxels"
+
+
+def _upper(span: dict | None) -> float | None:
+    return None if span is None else span["upper"]

@@ -1,0 +1,55 @@
+"""meshsdf.report.verdict: one sentence that says how far, where, and what became of topology."""
+
+import pytest
+
+from meshsdf.report.verdict import sentence, topology_words
+
+from .trips import data_of
+
+CLOSED = {"euler_number": 2, "n_components": 1, "is_watertight": True, "genus": 0}
+OPEN = {"euler_number": 1, "n_components": 1, "is_watertight": False, "genus": None}
+
+
+def words(before: dict, after: dict, n: int = 0) -> tuple[bool, str]:
+    found = topology_words({"before": before, "after": after, "n_repeated_places": n})
+    return found["is_kept"], found["sentence"]
+
+
+def test_the_same_counts_keep_the_topology():
+    assert words(CLOSED, CLOSED) == (
+        True,
+        "the topology is kept (Euler number 2, 1 component, watertight)",
+    )
+    assert words(OPEN, OPEN, n=7)[0] is True
+
+
+@pytest.mark.parametrize(
+    ("after", "n", "told"),
+    [
+        (CLOSED | {"euler_number": 0, "genus": 1}, 0, "Euler number 2 → 0, genus 0 → 1"),
+        (CLOSED | {"n_components": 3}, 0, "components 1 → 3"),
+        (OPEN, 0, "Euler number 2 → 1, watertight → open"),
+        (OPEN, 1, "counted by position: 1 vertex shares its place"),
+        (OPEN, 12, "counted by position: 12 vertices share places"),
+    ],
+)
+def test_every_count_that_changed_is_told(after, n, told):
+    is_kept, text = words(CLOSED, after, n)
+    assert is_kept is False
+    assert text.startswith("the topology is not kept (")
+    assert told in text
+
+
+def test_sharp_edges_are_told_where_there_are_some():
+    row = data_of("box")["rows"][1]
+    assert "its 12 sharp edges come back within" in sentence("a", row)
+    assert "sharp" not in sentence("a", row | {"sharp_edges": None})
+    one = row | {"sharp_edges": row["sharp_edges"] | {"n_edges": 1}}
+    assert "its one sharp edge comes back within" in sentence("a", one)
+
+
+def test_the_worst_place_is_that_of_the_farther_side():
+    row = data_of("box")["rows"][1]
+    assert f"face {row['forward']['source_face']} of the mesh" in sentence("a", row)
+    turned = sentence("a", row | {"worst": "backward"})
+    assert f"face {row['backward']['source_face']} of what came back" in turned
