@@ -80,6 +80,8 @@ def distribution_svg(data: dict, index: int) -> str:
         sides = (("forward", "mesh → round trip", FIRST), ("backward", "round trip → mesh", SECOND))
         for side, label, color in sides:
             shares = row[side]["shares"]
+            if shares is None:
+                continue
             voxels = np.array(shares["thresholds"]) / row["voxel_size"]
             lower, upper = 100 * np.array(shares["lower"]), 100 * np.array(shares["upper"])
             axes.fill_between(voxels, lower, upper, color=color, alpha=0.25, linewidth=0)

@@ -146,9 +146,9 @@ def _row(row: RoundTripRow, *, with_seconds: bool) -> dict:
         "forward": _direction(found.forward, details and details.forward_statistics, found),
         "backward": _direction(found.backward, details and details.backward_statistics, found),
         "measures": _measures(found.before, found.after, row.surface),
-        "sharp_edges": None if details is None else _sharp_edges(details.sharp_edges, found),
-        "budget": None if details is None else _budget(details.budget, found),
-        "conditioning": None if details is None else _conditioning(details.conditioning, found),
+        "sharp_edges": details and _sharp_edges(details.sharp_edges, found),
+        "budget": details and _budget(details.budget, found),
+        "conditioning": details and _conditioning(details.conditioning, found),
     }
 
 
@@ -268,7 +268,9 @@ BUDGET_INTERVALS = (
 CHANGE = 0.01  # of a voxel: what the samples are thought to change by, to see what that moves
 
 
-def _budget(budget: ErrorBudget, found: Comparison) -> dict:
+def _budget(budget: ErrorBudget | None, found: Comparison) -> dict | None:
+    if budget is None:
+        return None
     known = {name: in_units(getattr(budget, name), found) for name in BUDGET_INTERVALS}
     return known | {
         "sampling": in_units(_at_most(budget.sampling), found),
@@ -278,7 +280,9 @@ def _budget(budget: ErrorBudget, found: Comparison) -> dict:
     }
 
 
-def _conditioning(known: Conditioning, found: Comparison) -> dict:
+def _conditioning(known: Conditioning | None, found: Comparison) -> dict | None:
+    if known is None:
+        return None
     moved = known.displacement(CHANGE * found.voxel_size)
     return {
         "least_gradient": asdict(known.least_gradient),

@@ -18,7 +18,7 @@ from ..sdf.memory import require_memory
 from ..sdf.sign import SignMethod
 from ..surface import default_level, dual_contouring, marching_cubes
 from .compare import Comparison, compare
-from .row_details import RowDetails, row_details
+from .row_details import RowDetails, coarse_details, row_details
 
 Method = Literal["marching-cubes", "dual-contouring"]
 METHODS = ("marching-cubes", "dual-contouring")
@@ -56,7 +56,7 @@ class RoundTripRow:
     seconds : dict
         Time for distance, surface and compare, and for details where asked.
     details : RowDetails or None
-        Where the error comes from; None unless asked for, and in all but the finest rows.
+        How distances are spread, and where the error comes from; None unless asked for.
     """
 
     resolution: float
@@ -150,8 +150,8 @@ def roundtrip(
         World units. Double the last resolution until each method's error is certainly below,
         stops shrinking, or the next one would not fit in memory.
     details : bool
-        Of the finest row of each method also certify means and percentiles, find thin parts
-        lost, and say where the error comes from (`row_details`); takes several times as long.
+        Also certify means and percentiles, and of the finest row of each method find thin parts
+        lost and say where the error comes from (`row_details`); takes many times as long.
 
     Raises
     ------
@@ -241,17 +241,22 @@ class _Work:
         )
 
     def add_details(self, rows: list[RoundTripRow]) -> None:
-        """Put details into the finest row of each method; bands are made again, not kept."""
-        last = {row.method: i for i, row in enumerate(rows) if row.comparison is not None}
-        for resolution in dict.fromkeys(rows[i].resolution for i in last.values()):
-            band = mesh_to_band(self.mesh, resolution=resolution, **self.options)
-            for i in last.values():
-                if rows[i].resolution == resolution:
-                    begin = time.perf_counter()
-                    found = row_details(self.mesh, band, rows[i].surface, progress=self.progress)
-                    spent = round(time.perf_counter() - begin, 4)
-                    seconds = rows[i].seconds | {"details": spent}
-                    rows[i] = replace(rows[i], details=found, seconds=seconds)
+        """Put details into rows, all of them into the finest of each method."""
+        finest = {row.method: i for i, row in enumerate(rows)}.values()
+        band = None  # made again for the finest rows, rather than kept
+        for i, row in enumerate(rows):
+            if row.comparison is None:
+                continue
+            begin = time.perf_counter()
+            shapes, progress = (self.mesh, row.surface), self.progress
+            if i in finest:
+                if band is None or band.voxel_size != row.voxel_size:
+                    band = mesh_to_band(self.mesh, resolution=row.resolution, **self.options)
+                found = row_details(shapes[0], band, shapes[1], progress=progress)
+            else:
+                found = coarse_details(*shapes, row.voxel_size, progress=progress)
+            seconds = row.seconds | {"details": round(time.perf_counter() - begin, 4)}
+            rows[i] = replace(row, details=found, seconds=seconds)
 
     def _compared(self, surface: Mesh, resolution: float, voxel_size: float) -> Comparison:
         needed = BYTES_PER_FACE * (self.mesh.n_faces + surface.n_faces)

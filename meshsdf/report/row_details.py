@@ -5,6 +5,7 @@ How distances are spread, what is lost, where the error comes from, and what of 
 
 from dataclasses import dataclass
 
+from ..arrays import Number
 from ..grid import NarrowBand
 from ..mesh import Mesh
 from ..mesh.measures import area
@@ -15,6 +16,8 @@ from .error_budget import ErrorBudget, error_budget
 from .sharp_edges import SharpEdges, sharp_edges
 from .statistics import Statistics, one_sided_statistics
 from .tolerance import Tolerance
+
+MOST_EVALUATIONS = 1_500_000  # some seconds; then intervals are true, but wider
 
 BUDGET_SHARE = 1e-2
 """The intervals of the budget are narrowed until they are no wider than this part of a voxel."""
@@ -33,20 +36,29 @@ class RowDetails:
     Attributes
     ----------
     forward_statistics, backward_statistics : Statistics or None
-        How distances are spread over the mesh, and over what came back; None of no area.
-    budget : ErrorBudget
-        The error of every step.
-    conditioning : Conditioning
-        How much the surface moves when values change.
+        How distances are spread over the mesh, and over what came back; None of no area, and
+        ``backward_statistics`` is measured of the finest row only.
+    budget : ErrorBudget or None
+        The error of every step; of the finest row only.
+    conditioning : Conditioning or None
+        How much the surface moves when values change; of the finest row only.
     sharp_edges : SharpEdges or None
-        How far the mesh's sharp edges are from what came back; None if it has none.
+        How far the mesh's sharp edges are from what came back; None if it has none, and of the
+        finest row only.
     """
 
     forward_statistics: Statistics | None
-    backward_statistics: Statistics | None
-    budget: ErrorBudget
-    conditioning: Conditioning
-    sharp_edges: SharpEdges | None
+    backward_statistics: Statistics | None = None
+    budget: ErrorBudget | None = None
+    conditioning: Conditioning | None = None
+    sharp_edges: SharpEdges | None = None
+
+
+def coarse_details(
+    mesh: Mesh, surface: Mesh, voxel_size: Number, *, progress: Progress = silent
+) -> RowDetails:
+    """Measure what the table of all rows shows: how distances are spread over the mesh."""
+    return RowDetails(_statistics(mesh, surface, voxel_size, progress))
 
 
 def row_details(
@@ -65,11 +77,16 @@ def row_details(
 
 
 def _statistics(
-    source: Mesh, target: Mesh, voxel_size: float, progress: Progress
+    source: Mesh, target: Mesh, voxel_size: Number, progress: Progress
 ) -> Statistics | None:
     if area(source) == 0:
         return None
     tolerance = Tolerance(absolute=NOTHING * voxel_size, relative=STATISTICS_SHARE)
     return one_sided_statistics(
-        source, target, tolerance=tolerance, voxel_size=voxel_size, progress=progress
+        source,
+        target,
+        tolerance=tolerance,
+        max_evaluations=max(MOST_EVALUATIONS, 8 * source.n_faces),
+        voxel_size=voxel_size,
+        progress=progress,
     )

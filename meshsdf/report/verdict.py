@@ -49,12 +49,9 @@ def topology_words(measures: dict) -> dict:
             ("genus", "genus"),
             ("boundary loops", "n_boundary_loops"),
         )
-        if before.get(key) is not None and after.get(key) is not None
+        if before[key] is not None and after[key] is not None
     ]
     changes = [f"{name} {written(old)} → {written(new)}" for name, old, new in known if old != new]
-    same_openness = before["is_watertight"] == after["is_watertight"]
-    if not same_openness:
-        changes.append("open → watertight" if after["is_watertight"] else "watertight → open")
     if changes:
         n = measures["n_repeated_places"]
         if n > 0:
@@ -64,7 +61,7 @@ def topology_words(measures: dict) -> dict:
     facts = [
         f"Euler number {written(before['euler_number'])}",
         count(before["n_components"], "component"),
-        "watertight" if before["is_watertight"] else "open",
+        count(before["n_boundary_loops"], "boundary loop"),
     ]
     return {"is_kept": True, "sentence": f"the topology is kept ({', '.join(facts)})"}
 

@@ -152,7 +152,7 @@ def test_the_verdict_is_said_first_and_holds_the_numbers(whole):
     upper = row["largest"]["voxels"]["upper"]
     assert upper <= voxels <= 1.001 * upper
     assert f"on face {row[row['worst']]['source_face']} of" in sentence
-    assert "the topology is kept (Euler number 2, 1 component, watertight)" in sentence
+    assert "the topology is kept (Euler number 2, 1 component, no boundary loops)" in sentence
     assert "its 12 sharp edges come back within" in sentence
 
 
@@ -184,7 +184,7 @@ def test_holes_are_listed_with_their_places():
     shown = {at: text for at, _, text in reader.figures}
     assert shown["/two_set/holes/0/n_edges"] == str(hole["n_edges"])
     assert "the topology is not kept" in reader.texts["header"]
-    assert "open → watertight" in reader.texts["header"]
+    assert "boundary loops 1 → 0" in reader.texts["header"]
 
 
 def test_both_methods_have_a_verdict_and_sections_of_their_own():

@@ -1,12 +1,16 @@
 """meshsdf.report.roundtrip: one row per resolution and method, with details where asked."""
 
+import numpy as np
 import pytest
 
 from meshsdf.errors import ReportError
+from meshsdf.mesh import Mesh
+from meshsdf.mesh.measures import face_areas
 from meshsdf.mesh.primitives import icosphere
 from meshsdf.report.error_budget import error_budget
 from meshsdf.report.roundtrip import roundtrip
 from meshsdf.sdf import mesh_to_band
+from meshsdf.spatial.closest_point import ClosestPoint
 from meshsdf.surface import marching_cubes
 
 from .trips import facts, turned_box
@@ -17,12 +21,27 @@ BALL = icosphere(subdivisions=2)
 def test_details_are_measured_only_where_asked_and_of_the_finest_row():
     plain = roundtrip(turned_box(), [12]).rows[0]
     coarse, fine = facts("box")[0].rows
-    for row in (plain, coarse):
-        assert row.details is None
-        assert set(row.seconds) == {"distance", "surface", "compare"}
+    assert plain.details is None
+    assert set(plain.seconds) == {"distance", "surface", "compare"}
+    assert coarse.details.forward_statistics.mean.contains(mean_of(coarse.surface))
+    assert coarse.details.budget is None
+    assert fine.details.forward_statistics.mean.contains(mean_of(fine.surface))
     assert fine.details.sharp_edges.n_edges == 12
     assert set(fine.seconds) == {"distance", "surface", "compare", "details"}
     assert plain.comparison.distance == fine.comparison.distance
+
+
+def mean_of(surface: Mesh) -> float:
+    """The mean distance of the box to a surface, by many even samples of each face."""
+    box = turned_box()
+    u, v = np.meshgrid(*2 * [(np.arange(120) + 0.5) / 120])
+    # Folding the square's upper half onto its lower one leaves samples even over the triangle
+    u, v = np.where(u + v > 1, 1 - u, u).ravel(), np.where(u + v > 1, 1 - v, v).ravel()
+    weights = np.column_stack([1 - u - v, u, v])
+    points = np.einsum("kc,mcx->mkx", weights, box.triangles).reshape(-1, 3)
+    distances = ClosestPoint(surface)(points).distance.reshape(box.n_faces, -1)
+    areas = face_areas(box)
+    return float(areas @ distances.mean(axis=1) / areas.sum())
 
 
 def test_the_budget_is_that_of_the_band_and_surface_of_the_row():

@@ -6,8 +6,8 @@ from meshsdf.report.verdict import sentence, topology_words
 
 from .trips import data_of
 
-CLOSED = {"euler_number": 2, "n_components": 1, "is_watertight": True, "genus": 0}
-OPEN = {"euler_number": 1, "n_components": 1, "is_watertight": False, "genus": None}
+CLOSED = {"euler_number": 2, "n_components": 1, "genus": 0, "n_boundary_loops": 0}
+OPEN = {"euler_number": 1, "n_components": 1, "genus": None, "n_boundary_loops": 1}
 
 
 def words(before: dict, after: dict, n: int = 0) -> tuple[bool, str]:
@@ -18,7 +18,7 @@ def words(before: dict, after: dict, n: int = 0) -> tuple[bool, str]:
 def test_the_same_counts_keep_the_topology():
     assert words(CLOSED, CLOSED) == (
         True,
-        "the topology is kept (Euler number 2, 1 component, watertight)",
+        "the topology is kept (Euler number 2, 1 component, no boundary loops)",
     )
     assert words(OPEN, OPEN, n=7)[0] is True
 
@@ -28,7 +28,7 @@ def test_the_same_counts_keep_the_topology():
     [
         (CLOSED | {"euler_number": 0, "genus": 1}, 0, "Euler number 2 → 0, genus 0 → 1"),
         (CLOSED | {"n_components": 3}, 0, "components 1 → 3"),
-        (OPEN, 0, "Euler number 2 → 1, watertight → open"),
+        (OPEN, 0, "Euler number 2 → 1, boundary loops 0 → 1"),
         (OPEN, 1, "counted by position: 1 vertex shares its place"),
         (OPEN, 12, "counted by position: 12 vertices share places"),
     ],
