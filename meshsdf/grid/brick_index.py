@@ -123,6 +123,35 @@ def number_marked(entries: np.ndarray, first: int) -> int:
     return n
 
 
+def without_uniform_pages(root: RootTable, pages: PageTable) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tables without pages that hold one code alone, which stands above them instead.
+
+    ``root`` and the upper pages are changed. What is left depends on the bricks and codes alone,
+    not on where bricks were looked for.
+    """
+    n_upper = int(np.count_nonzero(root >= 0))
+    upper, lower = pages[:n_upper], pages[n_upper:]
+    stays, code = _is_varied(lower), lower[:, 0, 0, 0]
+    # Numbers as they will be, but for upper pages that go
+    number = np.where(stays, n_upper + np.cumsum(stays) - 1, code).astype(np.int32)
+    named = upper >= 0
+    upper[named] = number[upper[named] - n_upper]
+    upper_stays, code = _is_varied(upper), upper[:, 0, 0, 0]
+    upper[upper >= 0] -= np.int32(np.count_nonzero(~upper_stays))
+    number = np.where(upper_stays, np.cumsum(upper_stays) - 1, code).astype(np.int32)
+    named = root >= 0
+    root[named] = number[root[named]]
+    if stays.all() and upper_stays.all():
+        return root, pages
+    return root, np.concatenate([upper[upper_stays], lower[stays]])
+
+
+def _is_varied(pages: np.ndarray) -> np.ndarray:
+    """Which pages name anything below them, or hold more than one code."""
+    flat = pages.reshape(len(pages), PAGE**3)
+    return (flat.max(axis=1, initial=-1) >= 0) | (flat != flat[:, :1]).any(axis=1)
+
+
 def _check_order(coordinates: np.ndarray) -> None:
     step = np.diff(coordinates, axis=0)
     first = np.where(step[:, 0] != 0, step[:, 0], np.where(step[:, 1] != 0, step[:, 1], step[:, 2]))

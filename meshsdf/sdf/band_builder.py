@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Number, Vector3
 from ..grid import BrickIndex, NarrowBand
-from ..grid.brick_index import number_marked
+from ..grid.brick_index import number_marked, without_uniform_pages
 from ..kernels.band_distance import scan_edges, scan_faces, scan_vertices
 from ..kernels.brick_finish import closest_in_bricks, keep_active, renumber
 from ..kernels.brick_lookup import OUTSIDE
@@ -270,7 +270,8 @@ class BandBuilder:
         coordinates = self.coordinates[:n]
         renumber(coordinates, 0, self.root, self.pages)
         origin = self.lattice.page_origin
-        index = BrickIndex(coordinates + origin * 16, origin, self.root, self.pages)
+        tables = without_uniform_pages(self.root, self.pages)
+        index = BrickIndex(coordinates + origin * 16, origin, *tables)
         shaped = partial(np.reshape, shape=(n, 8, 8, 8))
         return NarrowBand(
             index,

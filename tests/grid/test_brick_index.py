@@ -8,7 +8,9 @@ from numpy.testing import assert_array_equal
 
 from meshsdf.errors import GridError
 from meshsdf.grid import BrickIndex, Grid, NarrowBand
-from meshsdf.grid.brick_index import INSIDE, OUTSIDE
+from meshsdf.grid.brick_index import INSIDE, OUTSIDE, without_uniform_pages
+from meshsdf.mesh.primitives import box_mesh
+from meshsdf.sdf import mesh_to_band
 
 
 def some_bricks(seed: int, n: int, spread: int, offset: int = 0) -> np.ndarray:
@@ -55,6 +57,37 @@ def test_the_table_of_a_long_diagonal_stays_small():
     index = BrickIndex.from_coordinates(np.stack([step] * 3, axis=1))
     assert index.root.nbytes + index.pages.nbytes < 30e6  # a dense table of pages: 7.8e9
     assert_array_equal(index.lookup(np.array([[7, 7, 7], [19999] * 3, [7, 7, 8]])), [7, 19999, -1])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_pages_of_one_code_are_dropped_and_no_answer_changes(seed):
+    rng = np.random.default_rng(seed)
+    bricks = some_bricks(seed, 60, 400)
+    runs = np.array([[3, 4, -500, 500], [-100, 90, -30, 700], [350, -350, 0, 9]])
+    index = BrickIndex.from_coordinates(bricks, runs)
+    asked = np.concatenate([rng.integers(-420, 420, (3000, 3)), bricks + rng.integers(-9, 9, 3)])
+    before = index.lookup(asked)
+    # Forget most bricks, as a band does that finds nothing near in them; the pages are still there
+    keep = rng.random(len(bricks)) < 0.2
+    code = np.where(keep, np.cumsum(keep) - 1, np.where(rng.random(len(bricks)) < 0.5, -1, -2))
+    expected = np.where(before >= 0, code[before], before)
+    pages = index.pages.copy()
+    lower = pages[np.count_nonzero(index.root >= 0) :]
+    lower[lower >= 0] = code[lower[lower >= 0]]
+    root, small = without_uniform_pages(index.root.copy(), pages)
+    assert len(small) < len(pages)
+    fewer = BrickIndex(bricks[keep], index.page_origin, root, small)
+    assert_array_equal(fewer.lookup(asked), expected)
+    again = without_uniform_pages(root.copy(), small.copy())
+    assert_array_equal(again[0], root)
+    assert_array_equal(again[1], small)
+
+
+def test_a_band_keeps_no_page_without_bricks_that_one_code_stands_for():
+    band = mesh_to_band(box_mesh((1.0, 0.9, 0.8)), resolution=400)
+    pages = band.index.pages[np.count_nonzero(band.index.root >= 0) :].reshape(-1, 4096)
+    assert ((pages >= 0).any(axis=1) | (pages != pages[:, :1]).any(axis=1)).all()
+    assert_array_equal(band.index.lookup(band.index.coordinates), np.arange(band.index.n_bricks))
 
 
 def test_bricks_out_of_order_or_twice_are_refused():
