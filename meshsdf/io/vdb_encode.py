@@ -5,9 +5,12 @@ import zlib
 
 import numpy as np
 
+from ..kernels.parallel import even_ranges, run_pieces
 from .blosc import blosc_encode
 from .half import halved
 from .vdb_values import ACTIVE_MASK, BLOSC, FULL, ValueLayout, full_width, same_bits
+
+NODES_PER_TASK = 256
 
 
 def encode_nodes(
@@ -38,8 +41,23 @@ def encode_nodes(
     ends = (np.cumsum(np.count_nonzero(keep, axis=1)) * layout.stored_width).tolist()
     pieces = [data[a:b] for a, b in zip([0, *ends[:-1]], ends, strict=True)]
     if layout.is_packed:
-        pieces = [_packed(piece, layout) for piece in pieces]
+        pieces = _all_packed(pieces, layout)
     return heads, pieces
+
+
+def _all_packed(pieces: list[memoryview], layout: ValueLayout) -> list[bytes]:
+    """The data of many nodes behind their sizes; zlib lets other threads run."""
+    packed = [b""] * len(pieces)
+    # Blosc makes a context for each call from a thread, which costs more than threads gain
+    n_tasks = 1 if layout.flags & BLOSC else len(pieces) // NODES_PER_TASK + 1
+    ranges = even_ranges(len(pieces), n_tasks)
+
+    def work(task: int) -> None:
+        for n in range(*ranges[task]):
+            packed[n] = _packed(pieces[n], layout)
+
+    run_pieces(work, len(ranges))
+    return packed
 
 
 def _packed(piece: memoryview, layout: ValueLayout) -> bytes:
