@@ -2,6 +2,7 @@
 
 import os
 import shlex
+from functools import partial
 
 import click
 
@@ -18,6 +19,7 @@ from .options import (
     path,
     sign_option,
 )
+from .reports import check_reports, limit_words, report_option, write_reports
 
 
 @click.command(
@@ -51,14 +53,7 @@ from .options import (
     help="Double the last resolution until the largest distance is below, world units; "
     "exit 1 if that cannot be.",
 )
-@click.option(
-    "--report",
-    "reports",
-    type=path,
-    multiple=True,
-    help="Also write all of it to a page (.html), a text (.md) or for programs (.json); may be "
-    "given several times.",
-)
+@report_option
 @click.option("--timings", is_flag=True, help="Tell times in the report, which then vary.")
 @force_option
 @max_memory_option
@@ -92,7 +87,7 @@ def command(
     from ..sdf import choose_sign
 
     check_input(mesh, kind="mesh")
-    _check_reports(reports, force)
+    check_reports(reports, force)
     with console.stage("load"):
         loaded = read_mesh(mesh, warn=console.warn)
     with console.stage("check"):
@@ -120,18 +115,20 @@ def command(
     for sentence in missed:
         console.say(sentence)
     if reports:
+        from ..report.formats import render_reports
         from ..report.report_data import Asked
 
         asked = Asked(
             name=os.path.basename(mesh),
             command=_command(context.params),
-            max_error=_limit(max_error),
+            max_error=limit_words(max_error),
             until=None if until is None else f"{until:g}",
             missed=tuple(missed),
             warnings=tuple(console.warnings),
             seconds=console.timings("load", "check") if timings else None,
         )
-        _write_reports(reports, force, console, (trip, loaded, found, choice, asked))
+        facts = trip, loaded, found, choice, asked
+        write_reports(reports, force, console, partial(render_reports, *facts))
     console.json(
         {
             "input": mesh,
@@ -149,48 +146,16 @@ def command(
     return NO if missed else YES
 
 
-def _check_reports(reports: tuple[str, ...], force: bool) -> None:
-    """Refuse before any work starts what could not be written after it."""
-    from ..errors import IoError
-    from ..io import check_output
-    from ..report.formats import format_of
-
-    for name in reports:
-        format_of(name)
-        check_output(name, force)
-    places = [os.path.realpath(name) for name in reports]
-    for i, place in enumerate(places):
-        if place in places[:i]:
-            what = "two reports would be written to one file"
-            raise IoError(what, f"--report {reports[i]}", "name each once")
-
-
-def _write_reports(reports: tuple[str, ...], force: bool, console: Console, facts: tuple) -> None:
-    from ..io import write_text
-    from ..report.formats import render_reports
-
-    with console.stage("report"):
-        texts = render_reports(*facts, names=reports, progress=console.progress)
-        for name, text in texts.items():
-            write_text(name, text, force=force)
-    console.result(", ".join(reports))
-
-
 def _missed(row, max_error: tuple[float, bool] | None, until: float | None) -> list[str]:
     """A sentence for every demand that the last row does not certainly meet."""
     missed = []
     if max_error is not None and not row.is_within(*max_error):
-        limit = f"--max-error {_limit(max_error)}"
+        limit = f"--max-error {limit_words(max_error)}"
         missed.append(f"{row.method} at {row.resolution:g}: the error may exceed {limit}")
     if until is not None and not row.is_within(until):
         why = "finer voxels do not help, or do not fit in memory"
         missed.append(f"{row.method} at {row.resolution:g} does not reach --until {until:g}: {why}")
     return missed
-
-
-def _limit(max_error: tuple[float, bool] | None) -> str | None:
-    """As the user wrote it."""
-    return None if max_error is None else f"{max_error[0]:g}{'vox' if max_error[1] else ''}"
 
 
 def _command(options: dict) -> str:
@@ -203,5 +168,5 @@ def _command(options: dict) -> str:
         if options[name] is not None:
             words += [f"--{name.replace('_', '-')}", f"{options[name]:g}"]
     if options["max_error"] is not None:
-        words += ["--max-error", _limit(options["max_error"])]
+        words += ["--max-error", limit_words(options["max_error"])]
     return shlex.join(words)

@@ -9,13 +9,16 @@ from ..arrays import Vector3
 from ..mesh import Mesh
 from ..ray import Camera, Scene, render_mesh
 from ..spatial.ray_hits import RayHits
+from .compare import Comparison
 from .hausdorff import OneSided
+from .pair_words import PairWords
 from .pictures import Picture, file_bytes
-from .roundtrip import RoundTripRow
 
 WIDTH, HEIGHT, SAMPLES = 640, 480, 2
 REACH_VOXELS, REACH_DISTANCES = 7.0, 2.5
 """Half the height of the picture: so many voxels, or so many times the distance if that is more."""
+
+REACH_DIAGONALS = 0.02  # the same where no voxel is known: so much of the diagonal
 
 AWAY = 4.0  # reaches: from where the picture is taken; what is farther out is not in it
 LIFT = 1e-6  # of the reach: where lines of sight start above the surface
@@ -41,25 +44,29 @@ class CloseUp:
     pictures: tuple[Picture, ...]
 
 
-def close_ups(mesh: Mesh, row: RoundTripRow, paints: Sequence[Callable]) -> tuple[CloseUp, ...]:
-    """Draw the worst place of both directions."""
-    found = row.comparison
-    names = "The mesh", "What came back"
+def close_ups(
+    pair: tuple[Mesh, Mesh], found: Comparison, paints: Sequence[Callable], says: PairWords
+) -> tuple[CloseUp, ...]:
+    """Draw the worst place of both directions of two surfaces, called as ``says`` says."""
     sides = (
-        ("forward", found.forward, 0, "Where the mesh is farthest from its round trip"),
-        ("backward", found.backward, 1, "Where the round trip is farthest from the mesh"),
+        ("forward", found.forward, 0, f"Where {says.a} is farthest from {says.b_of_a}"),
+        ("backward", found.backward, 1, f"Where {says.b} is farthest from {says.a}"),
     )
+    if found.voxel_size is None:
+        least_reach = REACH_DIAGONALS * found.diagonal
+    else:
+        least_reach = REACH_VOXELS * found.voxel_size
     # Every face is shown as it is: smooth shading would hide what the methods differ in
-    scenes = [Scene(surface, smooth=False) for surface in (mesh, row.surface)]
+    scenes = [Scene(surface, smooth=False) for surface in pair]
     answer = []
     for at, side, own, title in sides:
         order = own, 1 - own
         pictures = _pair(
             [scenes[i] for i in order],
             [paints[i] for i in order],
-            [names[i] for i in order],
+            [says.starts[i] for i in order],
             side,
-            row.voxel_size,
+            least_reach,
         )
         answer.append(CloseUp(title, at, pictures))
     return tuple(answer)
@@ -70,12 +77,12 @@ def _pair(
     paints: list[Callable],
     names: list[str],
     side: OneSided,
-    voxel_size: float,
+    least_reach: float,
 ) -> tuple[Picture, ...]:
     """Two pictures by one camera."""
     witness = side.witness
     nearest = side.nearest
-    reach = max(REACH_VOXELS * voxel_size, REACH_DISTANCES * side.distance.upper)
+    reach = max(least_reach, REACH_DISTANCES * side.distance.upper)
     center = 0.5 * (witness + nearest)
     normal = scenes[0].face_normals[side.source_face]
     back = line_of_sight(scenes[0].rays, witness, nearest, normal, reach)

@@ -20,21 +20,22 @@ ROOM = 0.11  # of the bar, between two labels
 
 @dataclass(frozen=True)
 class Scale:
-    """Distances in voxels to colours: by their square roots, so that small ones differ too."""
+    """Distances to colours: by their square roots, so that small ones differ too."""
 
     top: float
+    unit: str = "voxels"
 
-    def place(self, voxels: Values) -> Values:
+    def place(self, distances: Values) -> Values:
         """Where on the scale, from 0 to 1."""
-        return np.sqrt(np.minimum(voxels / self.top, 1.0))
+        return np.sqrt(np.minimum(distances / self.top, 1.0))
 
-    def colors(self, voxels: Values) -> np.ndarray:
-        """(n, 3) linear RGB of (n,) distances in voxels."""
-        return _colors(self.place(voxels))
+    def colors(self, distances: Values) -> np.ndarray:
+        """(n, 3) linear RGB of (n,) distances in the scale's unit."""
+        return _colors(self.place(distances))
 
     @property
     def ticks(self) -> list[float]:
-        """Round numbers that have room below the top, in voxels."""
+        """Round numbers that have room below the top."""
         decade = 10.0 ** np.floor(np.log10(self.top))
         found = [0.0]
         for step in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
@@ -57,7 +58,7 @@ class Scale:
         bar = f'<rect {place} fill="url(#colors-{name})"/>'
         labels = [written(tick) for tick in self.ticks]
         values = np.array([*self.ticks, self.top])
-        labels.append(f"{written(self.top, 'up', 3)} voxels")
+        labels.append(f"{written(self.top, 'up', 3)} {self.unit}")
         marks = "".join(
             f'<line x1="{x:.1f}" y1="{BAR + 2}" x2="{x:.1f}" y2="{BAR + 7}"/>'
             f'<text x="{x:.1f}" y="{BAR + 19}">{label}</text>'

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ..errors import ReportError
@@ -10,6 +10,7 @@ from ..mesh import Mesh
 from ..mesh.two_set import TwoSetReport
 from ..progress import Progress, silent
 from ..sdf import SignChoice
+from .compare_report import ComparedPair, ComparisonAsked, compare_data, words_of
 from .report_data import Asked, report_data
 from .roundtrip import RoundTrip
 
@@ -74,16 +75,72 @@ def render_reports(
     """
     formats = [format_of(name) for name in names]
     data = report_data(trip, mesh, check, choice, asked)
-    made: dict[str, str] = {}
-    for kind in dict.fromkeys(formats):
-        if kind == "json":
-            made[kind] = json.dumps(data, indent=2, allow_nan=False) + "\n"
-        elif kind == "markdown":
-            from .markdown import markdown
 
-            made[kind] = markdown(data)
-        else:
-            made[kind] = _page(trip, mesh, data, progress)
+    def text() -> str:
+        from .markdown import markdown
+
+        return markdown(data)
+
+    return _rendered(names, formats, data, text, lambda: _page(trip, mesh, data, progress))
+
+
+def render_comparison(
+    pair: ComparedPair,
+    asked: ComparisonAsked,
+    *,
+    names: Sequence[str | os.PathLike],
+    progress: Progress = silent,
+) -> dict[str | os.PathLike, str]:
+    """Write a comparison as text in every format asked for.
+
+    Parameters
+    ----------
+    pair : ComparedPair
+        Both meshes and what was found of them.
+    asked : ComparisonAsked
+        What the user asked for.
+    names : sequence of path
+        Their suffixes name the formats.
+
+    Returns
+    -------
+    texts : dict
+        As for `render_reports`, which also tells what is raised.
+    """
+    formats = [format_of(name) for name in names]
+    data = compare_data(pair, asked)
+
+    def text() -> str:
+        from .compare_markdown import compare_markdown
+
+        return compare_markdown(data)
+
+    def drawn() -> str:
+        from .heat_maps import pair_maps, pair_scale
+        from .html import compare_page
+
+        scale, says = pair_scale(pair.comparison), words_of(data)
+        return compare_page(
+            data, pair_maps(pair.meshes, pair.comparison, scale, says, progress=progress)
+        )
+
+    return _rendered(names, formats, data, text, drawn)
+
+
+def _rendered(
+    names: Sequence[str | os.PathLike],
+    formats: list[str],
+    data: dict,
+    text: Callable[[], str],
+    drawn: Callable[[], str],
+) -> dict[str | os.PathLike, str]:
+    """Every format once, for all files that ask for it."""
+    writers = {
+        "json": lambda: json.dumps(data, indent=2, allow_nan=False) + "\n",
+        "markdown": text,
+        "html": drawn,
+    }
+    made = {kind: writers[kind]() for kind in dict.fromkeys(formats)}
     return {name: made[kind] for name, kind in zip(names, formats, strict=True)}
 
 

@@ -1,7 +1,7 @@
-"""Pictures of where a round trip differs: both surfaces, painted with the distance between them.
+"""Pictures of where two surfaces differ: both, painted with the distance between them.
 
 Every pixel shows the exact distance of what it sees to the other surface. One scale serves all
-pictures of a report: logarithmic, in voxels, for what matters spans several powers of ten.
+pictures of a report; its colours follow square roots, for what matters spans powers of ten.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,6 +17,8 @@ from ..ray import Scene, frame, render_mesh
 from ..spatial.closest_point import ClosestPoint
 from .close_up import CloseUp, close_ups
 from .color_bar import LEAST_TOP, Scale
+from .compare import Comparison
+from .pair_words import ROUND_TRIP, PairWords
 from .pictures import Picture, file_bytes
 from .roundtrip import RoundTripRow
 
@@ -29,10 +31,7 @@ VIEWS = {
     "bottom": "from −y",
 }
 WIDTH, HEIGHT, SAMPLES = 480, 400, 2
-TITLES = (
-    "The mesh: how far it is from its round trip",
-    "What came back: how far it is from the mesh",
-)
+LEAST_SHARE = 1e-6  # of the diagonal: as `LEAST_TOP`, where no voxel is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +81,37 @@ def heat_maps(
     scale : Scale
         From `common_scale`.
     """
-    pair = mesh, row.surface
+    return pair_maps((mesh, row.surface), row.comparison, scale, ROUND_TRIP, progress=progress)
+
+
+def pair_scale(found: Comparison) -> Scale:
+    """Return the scale of two surfaces: in voxels, or in units of length where none is known."""
+    upper = float(found.distance.upper)
+    if found.voxel_size is None:
+        return Scale(max(LEAST_SHARE * found.diagonal, upper), "units")
+    return Scale(max(LEAST_TOP, found.in_voxels(upper)))
+
+
+def pair_maps(
+    pair: tuple[Mesh, Mesh],
+    found: Comparison,
+    scale: Scale,
+    says: PairWords,
+    *,
+    progress: Progress = silent,
+) -> HeatMaps:
+    """Draw two surfaces of which `compare` found something, called as ``says`` says."""
+    unit = 1.0 if found.voxel_size is None else found.voxel_size
     # Each surface is painted with its distance to the other one
-    paints = [painter(ClosestPoint(other), row.voxel_size, scale) for other in reversed(pair)]
+    paints = [painter(ClosestPoint(other), unit, scale) for other in reversed(pair)]
+    titles = (
+        f"{says.starts[0]}: how far it is from {says.b_of_a}",
+        f"{says.starts[1]}: how far it is from {says.a}",
+    )
     box = Box.around(np.concatenate([surface.vertices[surface.faces.ravel()] for surface in pair]))
     steps = _steps(2 * len(VIEWS), progress)
     sides = []
-    for surface, paint, title in zip(pair, paints, TITLES, strict=True):
+    for surface, paint, title in zip(pair, paints, titles, strict=True):
         scene, views = Scene(surface), []
         for name, words in VIEWS.items():
             next(steps)
@@ -99,17 +122,17 @@ def heat_maps(
             alt = f"{title}, {words}"
             views.append(Picture(file_bytes(picture), WIDTH, HEIGHT, words, alt))
         sides.append(Side(title, tuple(views)))
-    return HeatMaps(scale, tuple(sides), close_ups(mesh, row, paints))
+    return HeatMaps(scale, tuple(sides), close_ups(pair, found, paints, says))
 
 
 def painter(
-    closest: ClosestPoint, voxel_size: Number, scale: Scale
+    closest: ClosestPoint, unit: Number, scale: Scale
 ) -> Callable[[Points, np.ndarray], Points]:
-    """Return what gives points the colour of their distance."""
+    """Return what gives points the colour of their distance, in a unit of so many world units."""
 
     def paint(points: Points, faces: np.ndarray) -> Points:
         distance = closest.distances(np.ascontiguousarray(points)).distance
-        return scale.colors(distance / voxel_size)
+        return scale.colors(distance / unit)
 
     return paint
 

@@ -1,4 +1,4 @@
-"""The report of a round trip as one HTML file: no network, no script, the JSON inside.
+"""A report as one HTML file: no network, no script, the JSON inside.
 
 Every number on the page is looked up in the report's dict by its JSON pointer (RFC 6901), which the
 page carries beside it: ``<data value="…" data-at="/rows/2/largest/voxels/upper">0.8713</data>``.
@@ -8,14 +8,15 @@ import json
 from base64 import b64encode
 from importlib.resources import files
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
 from . import notation
+from .compare_report import main_unit, units_of, words_of
 from .heat_maps import HeatMaps
-from .markdown import MEASURES, UNITS
-from .plots import distribution_svg, errors_svg
-from .pointers import distance_pointers, look_up
+from .pair_words import ROUND_TRIP
+from .plots import distribution_svg, errors_svg, shares_svg
+from .pointers import MEASURES, UNITS, distance_pointers, look_up
 from .verdict import METHOD_WORDS
 
 BUDGET_WORDS = {
@@ -28,7 +29,7 @@ BUDGET_WORDS = {
 
 
 def page(data: dict, maps: dict[int, HeatMaps] | None = None) -> str:
-    """Write the page.
+    """Write the page of a round trip.
 
     Parameters
     ----------
@@ -42,33 +43,80 @@ def page(data: dict, maps: dict[int, HeatMaps] | None = None) -> str:
     html : str
         Valid HTML 5 that asks for nothing but itself.
     """
+    environment = _environment(data)
+    environment.globals |= {
+        "timed": list(dict.fromkeys(name for row in data["rows"] for name in row["seconds"] or ())),
+        "words": METHOD_WORDS,
+        "units": UNITS,
+        "unit": ("voxels", "voxels"),
+        "budget_words": BUDGET_WORDS,
+    }
+    return environment.get_template("page.html.j2").render(
+        says=ROUND_TRIP,
+        normals=_have_sides(data["two_set"]),
+        maps=maps or {},
+        errors=Markup(errors_svg(data)),
+        distributions={index: Markup(distribution_svg(data, index)) for index in data["last_rows"]},
+    )
+
+
+def compare_page(data: dict, maps: HeatMaps | None = None) -> str:
+    """Write the page of two meshes compared.
+
+    Parameters
+    ----------
+    data : dict
+        From `compare_data`.
+    maps : HeatMaps, optional
+        Pictures of both.
+
+    Returns
+    -------
+    html : str
+        As for `page`.
+    """
+    ways = "A → B", "B → A"
+    plot = shares_svg(data["comparison"], "shares", ways, data["voxel_size"])
+    environment = _environment(data)
+    environment.globals |= {"units": units_of(data), "unit": main_unit(data)}
+    return environment.get_template("compare.html.j2").render(
+        says=words_of(data),
+        normals=all(_have_sides(found) for found in data["two_set"].values()),
+        heat=maps,
+        distribution=Markup(plot),
+    )
+
+
+def _environment(data: dict) -> Environment:
+    """What all pages use; their templates also need units."""
     looked_up = _Pointers(data)
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=FunctionLoader(_file),
     )
     environment.globals |= {
+        "data": data,
+        "style": Markup(_file("page.css")),
+        "embedded": Markup(embedded_json(data)),
         "figure": looked_up.figure,
         "interval": looked_up.interval,
         "place": looked_up.place,
         "change": looked_up.change,
-        "timed": list(dict.fromkeys(name for row in data["rows"] for name in row["seconds"] or ())),
-        "words": METHOD_WORDS,
-        "units": UNITS,
         "measure_names": MEASURES,
-        "budget_words": BUDGET_WORDS,
         "distance_pointers": distance_pointers,
         "count": notation.count,
     }
     environment.filters["uri"] = data_uri
-    template = environment.from_string(_file("page.html.j2"))
-    return template.render(
-        data=data,
-        style=Markup(_file("page.css")),
-        maps=maps or {},
-        errors=Markup(errors_svg(data)),
-        distributions={index: Markup(distribution_svg(data, index)) for index in data["last_rows"]},
-        embedded=Markup(embedded_json(data)),
-    )
+    return environment
+
+
+def _have_sides(two_set: dict) -> bool:
+    """Whether all faces show the same side, so that normals can be compared."""
+    turned = any(part["inside_out"] for part in two_set["components"])
+    return two_set["n_orientation_conflicts"] == 0 and not turned
 
 
 def _file(name: str) -> str:

@@ -1,37 +1,26 @@
 """The report of a round trip as Markdown: the same numbers as the page, without pictures."""
 
+from collections.abc import Sequence
 from unicodedata import category
 
 from .notation import count, interval, place, written
-from .pointers import distance_pointers, look_up
+from .pointers import MEASURES, UNITS, distance_pointers, look_up
 from .verdict import METHOD_WORDS
 
 NOT_SHOWN = {"Cc", "Cs", "Zl", "Zp"}  # control, half a character, ends of lines and paragraphs
-UNITS = (("world", "world units"), ("voxels", "voxels"), ("percent", "% of diagonal"))
-MEASURES = (
-    ("n_vertices", "vertices"),
-    ("n_faces", "faces"),
-    ("area", "area"),
-    ("volume", "volume"),
-    ("euler_number", "Euler number"),
-    ("n_components", "components"),
-    ("genus", "genus"),
-    ("n_boundary_loops", "boundary loops"),
-    ("is_watertight", "watertight"),
-)
 
 
 def markdown(data: dict) -> str:
     """Write the report from its dict; see `report_data`."""
-    parts = [f"# {_escaped(data['input']['name'])}: mesh to volume to mesh"]
-    parts += [_escaped(sentence) for sentence in data["verdict"]["sentences"]]
-    parts += [f"**{_escaped(sentence)}**" for sentence in data["limits"]["missed"]]
+    parts = [f"# {escaped(data['input']['name'])}: mesh to volume to mesh"]
+    parts += [escaped(sentence) for sentence in data["verdict"]["sentences"]]
+    parts += [f"**{escaped(sentence)}**" for sentence in data["limits"]["missed"]]
     parts += ["## Every resolution", _rows(data)]
     for index in data["last_rows"]:
         if not data["rows"][index]["is_empty"]:
             parts += _last(data["rows"][index])
     parts += ["## The two-set check and the sign", *_check(data)]
-    parts += ["## How it was made", *_made(data)]
+    parts += ["## How it was made", *made(data)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -62,14 +51,36 @@ def _rows(data: dict) -> str:
 def _last(row: dict) -> list[str]:
     title = f"{METHOD_WORDS[row['method']]} at {written(row['resolution'], digits=6)}"
     parts = [f"## {title[0].upper()}{title[1:]}"]
-    for name, words in (("forward", "Mesh → round trip"), ("backward", "Round trip → mesh")):
-        side = row[name]
+    parts += directions(row, ("Mesh → round trip", "Round trip → mesh"), UNITS)
+    parts.append(measures_table(row["measures"], ("before", "after")))
+    parts += lost_lines(row["forward"], "the mesh")
+    if row["backward"]["signed_mean"]:
+        signed = interval(row["backward"]["signed_mean"]["voxels"])
+        parts.append(
+            "Counted negative inside the mesh, the mean distance of what came back is "
+            f"{signed} voxels."
+        )
+    if row["budget"]:
+        parts.append(escaped(row["conditioning"]["words"]))
+        parts.append(escaped(row["budget"]["words"]))
+    return parts
+
+
+def directions(told: dict, heads: tuple[str, str], units: Sequence) -> list[str]:
+    """A table of distances for each direction."""
+    tables = []
+    for name, words in zip(("forward", "backward"), heads, strict=True):
+        side = told[name]
         body = [
-            [label, *(interval(look_up(side, f"{at}/{unit}")) for unit, _ in UNITS)]
+            [label, *(interval(look_up(side, f"{at}/{unit}")) for unit, _ in units)]
             for at, label in distance_pointers(side)
         ]
-        parts.append(_table([words, *(label for _, label in UNITS)], body))
-    measures = row["measures"]
+        tables.append(_table([words, *(label for _, label in units)], body))
+    return tables
+
+
+def measures_table(measures: dict, heads: tuple[str, str]) -> str:
+    """Sizes and counts of both."""
     body = [
         [
             label,
@@ -78,27 +89,17 @@ def _last(row: dict) -> list[str]:
         ]
         for key, label in MEASURES
     ]
-    parts.append(_table(["measure", "before", "after"], body))
-    parts += _lost(row)
-    if row["backward"]["signed_mean"]:
-        signed = interval(row["backward"]["signed_mean"]["voxels"])
-        parts.append(
-            "Counted negative inside the mesh, the mean distance of what came back is "
-            f"{signed} voxels."
-        )
-    if row["budget"]:
-        parts.append(_escaped(row["conditioning"]["words"]))
-        parts.append(_escaped(row["budget"]["words"]))
-    return parts
+    return _table(["measure", *heads], body)
 
 
-def _lost(row: dict) -> list[str]:
-    if row["forward"]["n_lost_parts"] is None:
+def lost_lines(side: dict, name: str, fate: str = "lost") -> list[str]:
+    """Parts of what is called ``name`` that are farther than a voxel from the other one."""
+    if side["n_lost_parts"] is None:
         return []
-    n, parts = row["forward"]["n_lost_parts"], row["forward"]["lost_parts"]
+    n, parts = side["n_lost_parts"], side["lost_parts"]
     if n == 0:
-        return ["No part of the mesh is lost."]
-    lines = [f"{count(n, 'part')} of the mesh {'is' if n == 1 else 'are'} lost:", ""]
+        return [f"No part of {name} is {fate}."]
+    lines = [f"{count(n, 'part')} of {name} {'is' if n == 1 else 'are'} {fate}:", ""]
     for part in parts:
         lines.append(
             f"- near {place(part['center'])}: {count(part['n_faces'], 'face')}, area "
@@ -108,18 +109,19 @@ def _lost(row: dict) -> list[str]:
 
 
 def _check(data: dict) -> list[str]:
-    lines = [f"- {_escaped(line)}" for line in data["two_set"]["words"]]
+    lines = [f"- {escaped(line)}" for line in data["two_set"]["words"]]
     sign = data["sign"]
-    lines.append(f"- sign by {sign['method']}: {_escaped(sign['reason'])}")
-    lines += [f"- {_escaped(text)}" for text in sign["warnings"]]
+    lines.append(f"- sign by {sign['method']}: {escaped(sign['reason'])}")
+    lines += [f"- {escaped(text)}" for text in sign["warnings"]]
     return ["\n".join(lines)]
 
 
-def _made(data: dict) -> list[str]:
+def made(data: dict) -> list[str]:
+    """The command, versions, and times if they are told."""
     parts = [f"    {_printable(data['command'])}"] if data["command"] else []
     versions = ", ".join(f"{name} {text}" for name, text in data["versions"].items())
     parts.append(f"{versions}.")
-    if data["seconds"] is not None:
+    if data.get("seconds") is not None:
         spent = ", ".join(f"{name} {written(time)}" for name, time in data["seconds"].items())
         parts.append(f"Seconds: {spent}.")
     return parts
@@ -130,7 +132,7 @@ def _table(head: list[str], body: list[list[str]]) -> str:
     return "\n".join("| " + " | ".join(cells) + " |" for cells in [head, rule, *body])
 
 
-def _escaped(text: str) -> str:
+def escaped(text: str) -> str:
     """Names of files and parts of sentences may hold what Markdown takes as marks."""
     return "".join(f"\\{c}" if c in "\\`*_[]<>#|&" else c for c in _printable(text))
 

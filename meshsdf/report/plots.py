@@ -70,29 +70,40 @@ def errors_svg(data: dict) -> str:
 def distribution_svg(data: dict, index: int) -> str:
     """Draw which share of the area is within which distance, both directions of one row.
 
-    The curves are bands: the share lies between their edges. An empty text if it was not measured.
+    An empty text if it was not measured.
     """
     row = data["rows"][index]
-    if row["is_empty"] or row["forward"]["shares"] is None:
+    if row["is_empty"]:
+        return ""
+    ways = "mesh → round trip", "round trip → mesh"
+    return shares_svg(row, f"shares-{index}", ways, row["voxel_size"])
+
+
+def shares_svg(told: dict, name: str, ways: tuple[str, str], voxel_size: float | None) -> str:
+    """Draw the same for two surfaces, in voxels or, without a voxel size, in world units.
+
+    The curves are bands: the share lies between their edges. An empty text if it was not measured.
+    """
+    if told["forward"]["shares"] is None and told["backward"]["shares"] is None:
         return ""
 
     def draw(axes) -> None:
-        sides = (("forward", "mesh → round trip", FIRST), ("backward", "round trip → mesh", SECOND))
+        sides = zip(("forward", "backward"), ways, (FIRST, SECOND), strict=True)
         for side, label, color in sides:
-            shares = row[side]["shares"]
+            shares = told[side]["shares"]
             if shares is None:
                 continue
-            voxels = np.array(shares["thresholds"]) / row["voxel_size"]
+            lengths = np.array(shares["thresholds"]) / (voxel_size or 1.0)
             lower, upper = 100 * np.array(shares["lower"]), 100 * np.array(shares["upper"])
-            axes.fill_between(voxels, lower, upper, color=color, alpha=0.25, linewidth=0)
-            axes.plot(voxels, lower, color=color, label=label, linewidth=1.4)
-            axes.plot(voxels, upper, color=color, linewidth=0.7)
+            axes.fill_between(lengths, lower, upper, color=color, alpha=0.25, linewidth=0)
+            axes.plot(lengths, lower, color=color, label=label, linewidth=1.4)
+            axes.plot(lengths, upper, color=color, linewidth=0.7)
         axes.set_ylim(0, 101)
-        axes.set_xlabel("distance, voxels")
+        axes.set_xlabel("distance, voxels" if voxel_size else "distance, world units")
         axes.set_ylabel("share of the area within, %")
         axes.legend(loc="lower right", fontsize=9)
 
-    return _svg(draw, f"shares-{index}", "Share of the area within each distance", log="x")
+    return _svg(draw, name, "Share of the area within each distance", log="x")
 
 
 def _method_lines(axes, rows: list[dict], color: str, name: str) -> None:

@@ -2,6 +2,19 @@
 
 from typing import Any
 
+UNITS = (("world", "world units"), ("voxels", "voxels"), ("percent", "% of diagonal"))
+MEASURES = (
+    ("n_vertices", "vertices"),
+    ("n_faces", "faces"),
+    ("area", "area"),
+    ("volume", "volume"),
+    ("euler_number", "Euler number"),
+    ("n_components", "components"),
+    ("genus", "genus"),
+    ("n_boundary_loops", "boundary loops"),
+    ("is_watertight", "watertight"),
+)
+
 
 def look_up(data: Any, pointer: str) -> Any:
     """Return what a pointer names; None if something on the way is None.

@@ -1,6 +1,7 @@
-"""What a round trip did to a mesh, in one sentence per method; written from the report's JSON."""
+"""What a report says first, in a sentence per method or comparison; written from its JSON."""
 
 from .notation import count, place, written
+from .pair_words import PairWords
 
 METHOD_WORDS = {"marching-cubes": "marching cubes", "dual-contouring": "dual contouring"}
 SIDES = {"forward": "of the mesh", "backward": "of what came back"}
@@ -38,7 +39,40 @@ def sentence(name: str, row: dict) -> str:
     return "; ".join(parts) + "."
 
 
-def topology_words(measures: dict) -> dict:
+def comparison_verdict(told: dict, says: PairWords) -> dict:
+    """Say in one sentence how far two surfaces are apart, proved, where, and what else differs."""
+    voxels, percent = (written(_upper(told["largest"][u]), "up") for u in ("voxels", "percent"))
+    others = [] if told["largest"]["voxels"] is None else [f"{voxels} voxels"]
+    if told["largest"]["percent"] is not None:
+        others.append(f"{percent} % of the diagonal of {says.a}")
+    world = written(_upper(told["largest"]["world"]), "up")
+    worst = told[told["worst"]]
+    least = written(worst["maximum"]["world"]["lower"], "down")
+    topology = topology_words(told["measures"], "is the same", "differs")
+    parts = [
+        f"No point of {says.a} or {says.b} is farther than {world}"
+        f"{' (' if others else ''}{', '.join(others)}{')' if others else ''} from the other one, "
+        "which is proved",
+        f"the worst place is {place(worst['witness'])} on face {written(worst['source_face'])} "
+        f"of {says.a if told['worst'] == 'forward' else says.b}, at least {least} away",
+        topology["sentence"],
+    ]
+    if told["sharp_edges"]:
+        unit = "world" if told["largest"]["voxels"] is None else "voxels"
+        near = written(_upper(told["sharp_edges"]["largest"][unit]), "up")
+        n = told["sharp_edges"]["n_edges"]
+        whose = (
+            f"the {written(n)} sharp edges of {says.a} are"
+            if n > 1
+            else f"the one sharp edge of {says.a} is"
+        )
+        within = near if unit == "world" else f"{near} voxels"
+        parts.append(f"{whose} within {within} of {says.b}")
+    told["measures"]["is_topology_kept"] = topology["is_kept"]
+    return {"sentence": "; ".join(parts) + ".", "topology": topology}
+
+
+def topology_words(measures: dict, same: str = "is kept", other: str = "is not kept") -> dict:
     """Whether the counts that make the topology are the same before and after, and which differ."""
     before, after = measures["before"], measures["after"]
     known = [
@@ -57,13 +91,13 @@ def topology_words(measures: dict) -> dict:
         if n > 0:
             share = "1 vertex shares its place" if n == 1 else f"{written(n)} vertices share places"
             changes.append(f"counted by position: {share}")
-        return {"is_kept": False, "sentence": f"the topology is not kept ({', '.join(changes)})"}
+        return {"is_kept": False, "sentence": f"the topology {other} ({', '.join(changes)})"}
     facts = [
         f"Euler number {written(before['euler_number'])}",
         count(before["n_components"], "component"),
         count(before["n_boundary_loops"], "boundary loop"),
     ]
-    return {"is_kept": True, "sentence": f"the topology is kept ({', '.join(facts)})"}
+    return {"is_kept": True, "sentence": f"the topology {same} ({', '.join(facts)})"}
 
 
 def sharp_words(edges: dict) -> str:

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere
 
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
+EMBEDDED = r'<script type="application/json" id="meshsdf-report">(.*?)</script>'
 
 
 def ball(path: Path, *, radius: float = 1.0, subdivisions: int = 2) -> Path:
@@ -71,3 +73,8 @@ def random_bytes(path: Path, seed: int) -> Path:
     """A file of noise."""
     path.write_bytes(np.random.default_rng(seed).bytes(2000))
     return path
+
+
+def embedded(path: Path) -> dict:
+    """The JSON that the page of a report holds."""
+    return json.loads(re.search(EMBEDDED, path.read_text("utf-8"), flags=re.DOTALL)[1])

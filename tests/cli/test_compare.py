@@ -1,9 +1,13 @@
-"""meshsdf compare: limits, units, budgets."""
+"""meshsdf compare: limits, units, budgets, reports."""
+
+import json
 
 import pytest
 
 from meshsdf.io import write_mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere
+
+from .examples import embedded
 
 
 @pytest.fixture
@@ -77,3 +81,74 @@ def test_a_spent_time_budget_leaves_a_wider_interval_and_says_so(cli, tmp_path):
     assert wide["forward"]["is_within_tolerance"] is False
     assert wide["hausdorff"]["lower"] <= narrow["lower"]
     assert narrow["upper"] < wide["hausdorff"]["upper"]
+
+
+def test_one_run_writes_every_format_with_the_same_numbers(cli, pair, tmp_path):
+    names = [tmp_path / f"out.{suffix}" for suffix in ("html", "json", "md")]
+    asked = [word for name in names for word in ("--report", name)]
+    outcome = cli("compare", *pair, "--voxel-size", "0.123456789", "--no-statistics", *asked)
+    assert outcome.code == 0
+    assert outcome.out.splitlines()[-1] == ", ".join(map(str, names))
+    data = json.loads(names[1].read_text())
+    assert data["schema"] == "meshsdf.compare_report/1"
+    assert embedded(names[0]) == data
+    assert (data["a"]["name"], data["b"]["name"]) == ("a.ply", "b.ply")
+    command = f"meshsdf compare {pair[0]} {pair[1]} --voxel-size 0.123456789 --no-statistics"
+    assert data["command"] == command
+    assert command in names[2].read_text()
+    # The command of the report gives its bytes again, and the page is no more than asked for
+    cli(*command.split()[1:], "--report", tmp_path / "again.md")
+    assert (tmp_path / "again.md").read_bytes() == names[2].read_bytes()
+
+
+def test_a_report_changes_nothing_of_the_answer(cli, pair, tmp_path):
+    plain = cli("compare", *pair)
+    told = cli("compare", *pair, "--report", tmp_path / "a.json")
+    assert told.out == f"{plain.out}{tmp_path / 'a.json'}\n"
+    facts = cli("compare", *pair, "--json").json
+    assert "reports" not in facts
+    with_report = cli("compare", *pair, "--report", tmp_path / "b.json", "--json").json
+    assert with_report.pop("reports") == [str(tmp_path / "b.json")]
+    assert facts.pop("seconds").keys() <= with_report.pop("seconds").keys()
+    assert with_report == facts
+    data = json.loads((tmp_path / "b.json").read_text())
+    assert data["comparison"]["largest"]["world"] == facts["hausdorff"]
+
+
+def test_reports_are_judged_before_the_meshes_are_loaded(cli, pair, tmp_path, monkeypatch):
+    def load(*_, **__):
+        raise AssertionError("a mesh was loaded first")
+
+    monkeypatch.setattr("meshsdf.io.meshes.read_mesh", load)
+    old = tmp_path / "old.html"
+    old.write_text("precious")
+    for names, words in (
+        ([tmp_path / "a.pdf"], "a report with suffix '.pdf' cannot be written"),
+        ([tmp_path / "no" / "a.html"], "does not exist"),
+        ([old], "the output exists"),
+        ([tmp_path / "a.md", tmp_path / "a.md"], "two reports would be written to one file"),
+    ):
+        outcome = cli("compare", *pair, *(w for name in names for w in ("--report", name)))
+        assert outcome.code == 3
+        assert words in outcome.err
+    assert old.read_text() == "precious"
+
+
+def test_force_replaces_a_report(cli, pair, tmp_path):
+    old = tmp_path / "old.md"
+    old.write_text("precious")
+    assert cli("compare", *pair, "--report", old, "--force").code == 0
+    assert old.read_text().startswith("# a.ply and b.ply: compared")
+
+
+def test_a_missed_limit_is_told_in_the_report_and_by_the_exit_code(cli, pair, tmp_path):
+    for limit, code in (("0.24", 1), ("0.26", 0)):
+        name = tmp_path / f"{limit}.json"
+        assert cli("compare", *pair, "--max-error", limit, "--report", name).code == code
+        limits = json.loads(name.read_text())["limits"]
+        assert limits["passed"] is (code == 0)
+        assert limits["max_error"] == limit
+        assert limits["tolerance"] is None
+        assert [text.startswith("The meshes are 0.24") for text in limits["missed"]] == [
+            True
+        ] * code

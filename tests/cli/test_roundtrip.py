@@ -1,7 +1,6 @@
 """meshsdf roundtrip --report: pages, texts and JSON beside the table."""
 
 import json
-import re
 
 import pytest
 
@@ -10,13 +9,7 @@ from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh
 
 from ..report.trips import open_ball
-from .examples import ball
-
-EMBEDDED = r'<script type="application/json" id="meshsdf-report">(.*?)</script>'
-
-
-def embedded(path) -> dict:
-    return json.loads(re.search(EMBEDDED, path.read_text("utf-8"), flags=re.DOTALL)[1])
+from .examples import ball, embedded
 
 
 def roundtrip(cli, mesh, *options):

@@ -15,10 +15,11 @@ from meshsdf.mesh.primitives import box_mesh
 from meshsdf.report.close_up import HEIGHT, WIDTH, close_ups, line_of_sight
 from meshsdf.report.color_bar import LEAST_TOP, Scale
 from meshsdf.report.heat_maps import common_scale, painter
+from meshsdf.report.pair_words import ROUND_TRIP
 from meshsdf.spatial.closest_point import ClosestPoint
 from meshsdf.spatial.ray_hits import RayHits
 
-from .trips import facts, turned_box
+from .trips import facts
 
 SMALL, LARGE = box_mesh((1, 1, 1)), box_mesh((1.2, 1.2, 1.2))
 
@@ -78,7 +79,7 @@ def test_both_pictures_of_a_close_up_mark_the_same_two_places():
     row = trip.rows[1]
     scale = common_scale([row])
     paints = [painter(ClosestPoint(m), row.voxel_size, scale) for m in (row.surface, mesh)]
-    found = close_ups(turned_box(), row, paints)
+    found = close_ups((mesh, row.surface), row.comparison, paints, ROUND_TRIP)
     assert [close_up.at for close_up in found] == ["forward", "backward"]
     for close_up in found:
         first, second = ([float(x) for x in numbers(p.marker, "circle")] for p in close_up.pictures)
