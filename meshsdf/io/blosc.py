@@ -4,6 +4,9 @@ OpenVDB packs with LZ4, which `kernels.blosc_frames` opens; frames of other code
 packing, need the package numcodecs, which is imported here and nowhere else.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 
 from ..arrays import writable_alias
@@ -27,6 +30,17 @@ def blosc_encode(data: memoryview, width: int) -> bytes:
     codec = _codec()
     values = np.frombuffer(data, f"V{width}")  # Blosc takes the size of a value from its type
     return codec.compress(values, b"lz4", 9, codec.SHUFFLE)
+
+
+@contextmanager
+def without_blosc_threads() -> Iterator[None]:
+    """Keep Blosc from its threads, which cost more than they gain on data as small as a leaf's."""
+    codec = _codec()
+    before, codec.use_threads = codec.use_threads, False
+    try:
+        yield
+    finally:
+        codec.use_threads = before
 
 
 def blosc_decode(window: bytes, frames: list[tuple[int, int]], sizes: list[int]) -> bytes:

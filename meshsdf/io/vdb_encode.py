@@ -6,7 +6,7 @@ import zlib
 import numpy as np
 
 from ..kernels.parallel import even_ranges, run_pieces
-from .blosc import blosc_encode
+from .blosc import blosc_encode, without_blosc_threads
 from .half import halved
 from .vdb_values import ACTIVE_MASK, BLOSC, FULL, ValueLayout, full_width, same_bits
 
@@ -47,10 +47,11 @@ def encode_nodes(
 
 def _all_packed(pieces: list[memoryview], layout: ValueLayout) -> list[bytes]:
     """The data of many nodes behind their sizes; zlib lets other threads run."""
+    if layout.flags & BLOSC:  # so quick that threads would wait for each other
+        with without_blosc_threads():
+            return [_packed(piece, layout) for piece in pieces]
     packed = [b""] * len(pieces)
-    # Blosc makes a context for each call from a thread, which costs more than threads gain
-    n_tasks = 1 if layout.flags & BLOSC else len(pieces) // NODES_PER_TASK + 1
-    ranges = even_ranges(len(pieces), n_tasks)
+    ranges = even_ranges(len(pieces), len(pieces) // NODES_PER_TASK + 1)
 
     def work(task: int) -> None:
         for n in range(*ranges[task]):

@@ -14,6 +14,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
+from ..arrays import Values
 from .notation import written
 from .verdict import METHOD_WORDS
 
@@ -22,6 +23,7 @@ INK, MUTED, RULE = "#010203", "#040506", "#070809"
 FIRST, SECOND = "#0a0b0c", "#0d0e0f"
 NAMES = {INK: "ink", MUTED: "muted", RULE: "rule", FIRST: "first", SECOND: "second"}
 
+PER_BAR = 4  # thresholds of a distribution that make a bar of its histogram
 SIZE = 5.4, 3.7  # inches; letters of 10 points are then readable on a telephone as well
 STYLE = {
     "svg.fonttype": "none",
@@ -82,12 +84,13 @@ def distribution_svg(data: dict, index: int) -> str:
 def shares_svg(told: dict, name: str, ways: tuple[str, str], voxel_size: float | None) -> str:
     """Draw the same for two surfaces, in voxels or, without a voxel size, in world units.
 
-    The curves are bands: the share lies between their edges. An empty text if it was not measured.
+    Below it stands the histogram, with the same distances. Curves and steps are bands: the share
+    lies between their edges. An empty text if it was not measured.
     """
     if told["forward"]["shares"] is None and told["backward"]["shares"] is None:
         return ""
 
-    def draw(axes) -> None:
+    def draw(axes, below) -> None:
         sides = zip(("forward", "backward"), ways, (FIRST, SECOND), strict=True)
         for side, label, color in sides:
             shares = told[side]["shares"]
@@ -98,12 +101,37 @@ def shares_svg(told: dict, name: str, ways: tuple[str, str], voxel_size: float |
             axes.fill_between(lengths, lower, upper, color=color, alpha=0.25, linewidth=0)
             axes.plot(lengths, lower, color=color, label=label, linewidth=1.4)
             axes.plot(lengths, upper, color=color, linewidth=0.7)
+            _histogram(below, lengths, lower, upper, color)
         axes.set_ylim(0, 101)
-        axes.set_xlabel("distance, voxels" if voxel_size else "distance, world units")
+        below.set_ylim(bottom=0)
+        below.set_xlabel("distance, voxels" if voxel_size else "distance, world units")
         axes.set_ylabel("share of the area within, %")
+        below.set_ylabel("at about, %")
         axes.legend(loc="lower right", fontsize=9)
 
-    return _svg(draw, name, "Share of the area within each distance", log="x")
+    title = "Share of the area within each distance, and its histogram"
+    return _svg(draw, name, title, log="x", heights=(2, 1))
+
+
+def _histogram(axes, lengths: Values, lower: Values, upper: Values, color: str) -> None:
+    """The bars between the least and the most they can be, and their middles."""
+    edges, least, most = bars(lengths, lower, upper)
+    axes.stairs(most, edges, baseline=least, fill=True, color=color, alpha=0.25, linewidth=0)
+    axes.stairs(0.5 * (least + most), edges, color=color, linewidth=1.2)
+
+
+def bars(lengths: Values, lower: Values, upper: Values) -> tuple[np.ndarray, ...]:
+    """Edges of bars, and what each holds at least and at most, from a cumulative distribution.
+
+    Between lengths a and b lies at least lower(b) - upper(a), at most upper(b) - lower(a). The
+    first bar has all that is nearer than its end, wherever it begins.
+    """
+    ends = np.unique(np.append(np.arange(0, len(lengths), PER_BAR), len(lengths) - 1))
+    before = ends[:-1]
+    most = np.append(upper[ends[0]], upper[ends[1:]] - lower[before])
+    least = np.maximum(np.append(lower[ends[0]], lower[ends[1:]] - upper[before]), 0.0)
+    start = lengths[0] ** 2 / lengths[min(PER_BAR, len(lengths) - 1)]
+    return np.append(start, lengths[ends]), least, most
 
 
 def _method_lines(axes, rows: list[dict], color: str, name: str) -> None:
@@ -136,26 +164,33 @@ def _middle(span: dict) -> float:
     return span["estimate"] if "estimate" in span else 0.5 * (span["lower"] + span["upper"])
 
 
-def _svg(draw, name: str, title: str, log: str = "xy") -> str:
+def _svg(draw, name: str, title: str, log: str = "xy", heights: tuple[int, ...] = (1,)) -> str:
     with rc_context(STYLE | {"svg.hashsalt": name}):
         figure = Figure(figsize=SIZE, layout="constrained")
         FigureCanvasSVG(figure)
-        axes = figure.add_subplot()
-        if "x" in log:
-            axes.set_xscale("log")
-        if "y" in log:
-            axes.set_yscale("log")
-        draw(axes)
-        for axis, letter in ((axes.xaxis, "x"), (axes.yaxis, "y")):
-            if letter in log and not (letter == "x" and log == "xy"):
-                axis.set_major_locator(LogLocator(subs=(1, 2, 5) if log == "xy" else (1,)))
-                axis.set_major_formatter(FuncFormatter(lambda x, _: written(float(x), digits=2)))
-                axis.set_minor_locator(NullLocator())
-        axes.grid(linewidth=0.7)
-        axes.set_axisbelow(True)
+        panels = figure.subplots(
+            len(heights), sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights}
+        )[:, 0]
+        for axes in panels:
+            axes.set_xscale("log" if "x" in log else "linear")
+            axes.set_yscale("log" if "y" in log else "linear")
+        draw(*panels)
+        for axes in panels:
+            for axis, letter in ((axes.xaxis, "x"), (axes.yaxis, "y")):
+                if letter in log and not (letter == "x" and log == "xy"):
+                    _number_decades(axis, (1, 2, 5) if log == "xy" else (1,))
+            axes.grid(linewidth=0.7)
+            axes.set_axisbelow(True)
         file = io.StringIO()
         figure.savefig(file, format="svg", transparent=True, metadata={"Date": None})
     return _inline(file.getvalue(), name, title)
+
+
+def _number_decades(axis, steps: tuple[int, ...]) -> None:
+    """Write numbers as the rest of the page does, at these multiples of powers of ten."""
+    axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: written(float(x), digits=2)))
+    axis.set_minor_locator(NullLocator())
 
 
 def _inline(svg: str, name: str, title: str) -> str:

@@ -3,9 +3,10 @@
 import re
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
-from meshsdf.report.plots import NAMES, distribution_svg, errors_svg
+from meshsdf.report.plots import NAMES, bars, distribution_svg, errors_svg
 
 from .trips import data_of
 
@@ -56,6 +57,23 @@ def test_two_plots_on_a_page_share_no_identifier():
         named = set(identifiers(svg))
         assert set(re.findall(r"url\(#([^)]*)\)", svg)) <= named
         assert set(re.findall(r'href="#([^"]*)"', svg)) <= named
+
+
+@pytest.mark.parametrize("n", [1, 4, 5, 64])
+def test_bars_hold_the_histogram_of_any_distances_between_the_bounds(n):
+    rng = np.random.default_rng(n)
+    distances = np.sort(rng.gamma(2.0, size=1000))
+    lengths = np.geomspace(0.01, distances[-1], n)
+    true = np.searchsorted(distances, lengths, side="right") / 10.0
+    lower = np.maximum.accumulate(np.maximum(true - 0.5, 0.0))
+    upper = np.maximum.accumulate(np.minimum(true + 0.5, 100.0))
+    edges, least, most = bars(lengths, lower, upper)
+    assert len(edges) == len(least) + 1 == len(most) + 1
+    assert (np.diff(edges) > 0).all() or n == 1
+    inner = np.append(-np.inf, edges[1:])
+    counts = np.diff(np.searchsorted(distances, inner, side="right")) / 10.0
+    assert (least <= counts).all()
+    assert (counts <= most).all()
 
 
 @pytest.mark.parametrize("draw", [errors_svg, lambda data: distribution_svg(data, 1)])
