@@ -1,7 +1,8 @@
 """Run by the system's Python: files made by OpenVDB, and what OpenVDB finds in files.
 
 Usage: openvdb_process.py make DIR · dump FILE... (writes FILE.npz) · probe FILE... (reads
-FILE.npy, nodes, and writes FILE.npz: the values of the first grid there, and which are active).
+FILE.npy, nodes, and writes FILE.npz: the values of the first grid there, and which are active) ·
+quads FILE... (writes FILE.npz: the surface of the first grid as OpenVDB extracts it).
 """
 
 import json
@@ -61,6 +62,13 @@ def probe(path):
     accessor = grids[0].getConstAccessor()
     found = np.array([accessor.probeValue(tuple(ijk)) for ijk in np.load(path + ".npy").tolist()])
     np.savez(path + ".npz", values=found[:, 0].astype(np.float32), active=found[:, 1] == 1)
+
+
+def quads(path):
+    """The surface of the first grid."""
+    grids, _ = vdb.readAll(path)
+    points, faces = grids[0].convertToQuads(0.0)
+    np.savez(path + ".npz", points=points, quads=faces)
 
 
 def scattered(grid, numbers, value, inactive, n_leaves=12):
@@ -130,4 +138,4 @@ def make(folder):
 
 if __name__ == "__main__":
     for name in sys.argv[2:]:
-        {"make": make, "dump": dump, "probe": probe}[sys.argv[1]](name)
+        {"make": make, "dump": dump, "probe": probe, "quads": quads}[sys.argv[1]](name)

@@ -10,8 +10,12 @@ from numpy.testing import assert_array_equal
 from meshsdf.errors import IoError
 from meshsdf.grid import Grid
 from meshsdf.io.vdb import probe_vdb, read_vdb, read_vdb_grids, write_vdb, write_vdb_grids
-from meshsdf.mesh.primitives import box_mesh
+from meshsdf.mesh import Mesh
+from meshsdf.mesh.measures import volume
+from meshsdf.mesh.primitives import box_mesh, icosphere
+from meshsdf.report import hausdorff
 from meshsdf.sdf import mesh_to_band
+from meshsdf.surface import marching_cubes
 from tests.io.examples import narrow_band
 from tests.io.vdb_examples import (
     empty_band,
@@ -230,3 +234,18 @@ def test_probing_tells_what_openvdb_tells_without_reading_values(theirs):
     assert facts["grids"][2]["compression"] == "blosc + active values"
     assert probe_vdb(theirs / "sphere_half.vdb")["grids"][0]["dtype"] == "float16"
     assert probe_vdb(theirs / "stream.vdb")["grids"][0]["name"] == "odd"
+
+
+def test_openvdb_extracts_the_surface_that_we_extract(tmp_path):
+    band = mesh_to_band(icosphere(1.0, subdivisions=5), resolution=128)
+    path = tmp_path / "ball.vdb"
+    write_vdb(path, band)
+    run_openvdb("quads", path)
+    with np.load(f"{path}.npz") as data:
+        points, quads = data["points"].astype(np.float64), data["quads"].astype(np.int32)
+    theirs = Mesh(points, np.concatenate([quads[:, [2, 1, 0]], quads[:, [3, 2, 0]]]))
+    voxel = band.voxel_size
+    apart = hausdorff(marching_cubes(band), theirs, tolerance=1e-3 * voxel).distance
+    assert apart.upper < 0.02 * voxel
+    # Seen from outside both go around the same way
+    assert volume(theirs) == pytest.approx(4.18, rel=0.01)
