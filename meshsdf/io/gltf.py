@@ -117,6 +117,7 @@ def _size(value: object, what: str) -> int:
 
 def _prepared(tree: dict, files: _Files, warn: Warn) -> list[dict]:
     """Change the document so that trimesh reads it truly; return its primitives, in order."""
+    _check_version(tree.get("asset", {}).get("version", "2.0"))
     for name in tree.get("extensionsRequired", ()):
         if not str(name).startswith(_READ_AS_PLAIN):
             raise ValueError(f"it needs the extension {name}, which is not read")
@@ -139,6 +140,12 @@ def _prepared(tree: dict, files: _Files, warn: Warn) -> list[dict]:
         warn(f"its {name} are not applied")
     _prepare_nodes(tree)
     return primitives
+
+
+def _check_version(version: object) -> None:
+    """Version 1 is another format altogether."""
+    if int(float(str(version).split(".")[0])) < 2:
+        raise ValueError(f"it is glTF version {version}; only 2 is read")
 
 
 def _prepare_nodes(tree: dict) -> None:

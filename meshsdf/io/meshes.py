@@ -28,7 +28,6 @@ PARSER_ERRORS = (
     LookupError,
     MemoryError,
     NameError,
-    NotImplementedError,
     OSError,
     RecursionError,
     TypeError,

@@ -5,8 +5,6 @@ Ju, Losasso, Schaefer and Warren 2002 (doi:10.1145/566654.566586), with one vert
 normals and features taken from the mesh itself where it is at hand.
 """
 
-import numpy as np
-
 from ..arrays import Number
 from ..errors import SurfaceError
 from ..grid import Grid, NarrowBand
@@ -25,7 +23,8 @@ from .hermite import (
     locate_on_mesh,
     to_world,
 )
-from .marching_cubes import BORDERS, Border
+from .level import check_level
+from .marching_cubes import Border, check_choices
 
 LARGEST_ANGLE = 180.0
 
@@ -147,36 +146,11 @@ def dual_contouring(
 
 
 def _check(volume: NarrowBand | Grid, level: Number, feature_angle: Number, border: str) -> None:
-    where = "dual_contouring(level=...)"
-    if border not in BORDERS:
-        raise SurfaceError(
-            f"border is {border!r}", "dual_contouring(border=...)", f"pass one of {BORDERS}"
-        )
+    check_choices(border, "manifold", level, "dual_contouring")
     if not 0 < feature_angle <= LARGEST_ANGLE:
         raise SurfaceError(
             f"feature_angle is {feature_angle}",
             "dual_contouring(feature_angle=...)",
             "pass degrees above 0, up to 180; 30 is usual",
         )
-    if not np.isfinite(level):
-        raise SurfaceError(f"level is {level}", where, "pass a finite number")
-    if not volume.is_signed and level <= 0:
-        raise SurfaceError(
-            f"level is {level:g}, but the volume is unsigned: no value lies below 0",
-            where,
-            f"pass a level above 0, such as the voxel size, {volume.voxel_size:g}",
-        )
-    if isinstance(volume, NarrowBand):
-        if abs(level) >= volume.background:
-            raise SurfaceError(
-                f"level is {level:g}, but the band holds only values between "
-                f"{-volume.background:g} and {volume.background:g}",
-                where,
-                "pass a level strictly between, or make the band wider with half_width",
-            )
-    elif min(volume.values.shape) < 2:
-        raise SurfaceError(
-            f"the grid has {' x '.join(map(str, volume.values.shape))} nodes, so it has no cell",
-            "dual_contouring(volume=...)",
-            "pass at least 2 nodes along each axis",
-        )
+    check_level(volume, float(level), "dual_contouring")

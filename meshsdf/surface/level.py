@@ -18,6 +18,38 @@ def default_level(volume: NarrowBand | Grid) -> tuple[float, tuple[str, ...]]:
     )
 
 
+def check_level(volume: NarrowBand | Grid, level: float, function: str) -> None:
+    """Refuse a level that the volume cannot have, and a grid without cells.
+
+    Raises
+    ------
+    SurfaceError
+        No value lies below the level, or beyond it nothing is known, or there is no cell;
+        ``function`` is named as the place.
+    """
+    where = f"{function}(level=...)"
+    if not volume.is_signed and level <= 0:
+        raise SurfaceError(
+            f"level is {level:g}, but the volume is unsigned: no value lies below 0",
+            where,
+            f"pass a level above 0, such as the voxel size, {volume.voxel_size:g}",
+        )
+    if isinstance(volume, NarrowBand):
+        if abs(level) >= volume.background:
+            raise SurfaceError(
+                f"level is {level:g}, but the band holds only values between "
+                f"{-volume.background:g} and {volume.background:g}",
+                where,
+                "pass a level strictly between, or make the band wider with half_width",
+            )
+    elif min(volume.values.shape) < 2:
+        raise SurfaceError(
+            f"the grid has {' x '.join(map(str, volume.values.shape))} nodes, so it has no cell",
+            f"{function}(volume=...)",
+            "pass at least 2 nodes along each axis",
+        )
+
+
 def require_faces(surface: Mesh, *, level: float) -> None:
     """Refuse an empty surface.
 

@@ -18,6 +18,7 @@ from .brick_field import field_of_band
 from .brick_surface import brick_surface, special_brick_cells
 from .cap import MATERIALS, name_vertices
 from .fans import separate_fans
+from .level import check_level
 from .plane_surface import plane_surface, special_plane_cells
 from .trilinear_cases import CellCases, manifold_cells, trilinear_cells
 
@@ -109,7 +110,7 @@ def marching_cubes(
     2
     """
     check_choices(border, topology, level, "marching_cubes")
-    _check(volume, float(level), "marching_cubes")
+    check_level(volume, float(level), "marching_cubes")
     cases = cases_of(topology)
     is_capped = border == "cap" and isinstance(volume, Grid)
     where = volume.translation if isinstance(volume, NarrowBand) else volume.origin
@@ -166,7 +167,7 @@ def singular_cells(volume: NarrowBand | Grid, *, level: Number = 0.0) -> Ijk:
     array([[0, 0, 0]])
     """
     check_choices("open", "trilinear", level, "singular_cells")
-    _check(volume, float(level), "singular_cells")
+    check_level(volume, float(level), "singular_cells")
     cases = trilinear_cells()
     if isinstance(volume, NarrowBand):
         found = special_brick_cells(field_of_band(volume, float(level)), level, cases)
@@ -194,30 +195,6 @@ def check_choices(border: str, topology: str, level: Number, function: str) -> N
             )
     if not np.isfinite(level):
         raise SurfaceError(f"level is {level}", f"{function}(level=...)", "pass a finite number")
-
-
-def _check(volume: NarrowBand | Grid, level: float, function: str) -> None:
-    where = f"{function}(level=...)"
-    if not volume.is_signed and level <= 0:
-        raise SurfaceError(
-            f"level is {level:g}, but the volume is unsigned: no value lies below 0",
-            where,
-            f"pass a level above 0, such as the voxel size, {volume.voxel_size:g}",
-        )
-    if isinstance(volume, NarrowBand):
-        if abs(level) >= volume.background:
-            raise SurfaceError(
-                f"level is {level:g}, but the band holds only values between "
-                f"{-volume.background:g} and {volume.background:g}",
-                where,
-                "pass a level strictly between, or make the band wider with half_width",
-            )
-    elif min(volume.values.shape) < 2:
-        raise SurfaceError(
-            f"the grid has {' x '.join(map(str, volume.values.shape))} nodes, so it has no cell",
-            f"{function}(volume=...)",
-            "pass at least 2 nodes along each axis",
-        )
 
 
 def _has_gaps_at_border(values: np.ndarray) -> bool:
