@@ -10,20 +10,13 @@ under these keys:
 """
 
 import math
-import os
-import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from ..arrays import Vector3
-from ..errors import GridError, IoError
 from ..grid import Grid
-from .registry import checked_input
 from .vdb_stream import UnsuitedError, printable
 from .volume_checks import check_volume
 from .warn import Warn
@@ -193,32 +186,3 @@ def counts_of(text: str, count: int, what: str) -> tuple[int, ...]:
     if len(words) != count or not is_whole or max(map(len, words), default=0) > 18:
         raise ValueError(f"{what} is '{printable(text)}', not {count} whole numbers")
     return tuple(int(word) for word in words)
-
-
-@contextmanager
-def opened(path: str | os.PathLike) -> Iterator[tuple[BinaryIO, Path]]:
-    """A file to read, and its path; what is found wrong with it becomes IoError."""
-    path = checked_input(path)
-    try:
-        with open(path, "rb") as file:
-            yield file, path
-    except UnsuitedError as error:
-        raise IoError(f"{path.name}: {error}", f"file {path}", error.fix) from error
-    except GridError as error:
-        raise _unreadable(path, error.what) from error
-    except MemoryError as error:
-        raise _unreadable(path, "it does not fit in memory") from error
-    except OSError as error:
-        raise _unreadable(path, error.strerror or str(error)) from error
-    except RecursionError as error:
-        raise _unreadable(path, "its parts are nested too deeply") from error
-    except (ValueError, zlib.error, EOFError, OverflowError) as error:
-        raise _unreadable(path, str(error)) from error
-
-
-def _unreadable(path: Path, reason: str) -> IoError:
-    return IoError(
-        f"{path.name} is not a readable volume: {' '.join(reason.split())[:300]}",
-        f"file {path}",
-        "write it again; if it was copied, copy it again",
-    )

@@ -9,8 +9,6 @@ file must not reach a library in C++.
 import errno
 import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
@@ -21,13 +19,13 @@ from ..errors import IoError
 from ..grid import Grid, NarrowBand
 from .atomic import check_output
 from .dense_form import dense_form
-from .dense_header import opened
 from .detached import written_together
 from .exr_facts import FORMAT, PREFIX, ExrFacts, LayoutName, parse_facts
 from .exr_header import Part, read_parts
 from .exr_layout import Slicing, Up, nearly_square
 from .exr_pixels import read_images
 from .half import check_half
+from .opened import opened_reader
 from .vdb_stream import VdbReader
 from .volume_checks import check_volume
 from .warn import Warn, ignore
@@ -131,7 +129,7 @@ def read_exr(path: str | os.PathLike, *, warn: Warn = ignore) -> Grid:
         There is no such file, or it is damaged, cut off, or a picture. Nothing larger than the
         file can unpack to is ever allocated.
     """
-    with _opened(path) as reader:
+    with opened_reader(path) as reader:
         parts, is_multi, facts = _headers(reader)
         images = read_images(reader, parts, is_multi)
         values = np.empty(facts.slicing.shape, np.float32)
@@ -153,7 +151,7 @@ def read_exr(path: str | os.PathLike, *, warn: Warn = ignore) -> Grid:
 
 def probe_exr(path: str | os.PathLike) -> dict:
     """Return what the header says, see `exr_facts`, and that the ``kind`` is "grid"."""
-    with _opened(path) as reader:
+    with opened_reader(path) as reader:
         return {"kind": "grid", **_headers(reader)[2].entries()}
 
 
@@ -261,13 +259,6 @@ def _headers(reader: VdbReader) -> tuple[list[Part], bool, ExrFacts]:
         if part.shape != shape or part.dtype.name != facts.dtype:
             raise ValueError(f"it has {part.dtype.name} pixels {part.shape}, not {shape}")
     return parts, is_multi, facts
-
-
-@contextmanager
-def _opened(path: str | os.PathLike) -> Iterator[VdbReader]:
-    """A reader of a file; what it finds wrong becomes IoError."""
-    with opened(path) as (file, _):
-        yield VdbReader(file, os.fstat(file.fileno()).st_size)
 
 
 def _start_of(path: Path) -> bytes:

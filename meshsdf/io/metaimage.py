@@ -23,11 +23,11 @@ from .dense_header import (
     counts_of,
     numbers_of,
     one_spacing,
-    opened,
     told_of,
     upright_spacings,
 )
 from .detached import data_beside, data_name, written_together
+from .opened import opened
 from .text_rows import numbers
 from .unpacking import Inflater, check_claim
 from .vdb_stream import UnsuitedError, printable

@@ -15,9 +15,9 @@ import numpy as np
 from ..grid import Grid, NarrowBand
 from .atomic import atomic_write
 from .dense_form import dense_form
-from .dense_header import opened
 from .detached import data_beside, data_name, written_together
 from .nrrd_header import NrrdHeader, header_text, read_header
+from .opened import opened
 from .text_rows import numbers
 from .unpacking import LEAST_UNPACKED, Inflater, check_claim
 from .warn import Warn, ignore

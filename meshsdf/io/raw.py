@@ -27,9 +27,10 @@ import numpy as np
 from ..errors import IoError
 from ..grid import Grid, NarrowBand
 from .dense_form import dense_form
-from .dense_header import PREFIX, DenseHeader, one_spacing, opened, told_of
+from .dense_header import PREFIX, DenseHeader, one_spacing, told_of
 from .detached import data_name, written_together
 from .half import check_half, halved
+from .opened import opened
 from .registry import checked_input
 from .unpacking import check_claim
 from .vdb_stream import printable

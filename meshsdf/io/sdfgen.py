@@ -14,7 +14,8 @@ import numpy as np
 from ..grid import Grid, NarrowBand
 from .atomic import atomic_write
 from .dense_form import dense_form
-from .dense_header import DenseHeader, counts_of, numbers_of, one_spacing, opened
+from .dense_header import DenseHeader, counts_of, numbers_of, one_spacing
+from .opened import opened
 from .text_rows import numbers
 from .unpacking import check_claim
 from .warn import Warn, ignore

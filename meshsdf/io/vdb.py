@@ -16,27 +16,24 @@ some 20 n bytes of floats, 60 n of vectors, whatever is packed within.
 """
 
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from ..errors import GridError, IoError
+from ..errors import IoError
 from ..grid import Grid, NarrowBand
 from .atomic import atomic_write, check_output
 from .blosc import require_blosc
 from .half import check_half
-from .registry import checked_input
+from .opened import opened_reader
 from .vdb_archive import read_grid, read_headers, write_archive
 from .vdb_band import band_to_grids, grid_to_band, with_companions
 from .vdb_choice import file_facts, is_band, named_grid, omitted, owner_of, volume_grid
 from .vdb_dense import GridClass, dense_to_grid, grid_to_dense
 from .vdb_grid import VdbGrid, check_grid
 from .vdb_metadata import Metadata, check_metadata
-from .vdb_stream import UnsuitedError, VdbReader
 from .vdb_values import ACTIVE_MASK, BLOSC, ZIP
 from .volume_checks import check_volume
 from .warn import Warn, ignore
@@ -200,7 +197,7 @@ def read_vdb(
     """
     where = f"file {path}"
     notes: list[str] = []
-    with _opened(path) as reader:
+    with opened_reader(path) as reader:
         header = read_headers(reader)
         chosen = volume_grid(header, grid, where)
         if grid is None:
@@ -238,7 +235,7 @@ def read_vdb_grids(
         There is no such file or grid, or it is damaged.
     """
     notes: list[str] = []
-    with _opened(path) as reader:
+    with opened_reader(path) as reader:
         header = read_headers(reader)
         if names is None:
             notes = omitted(header, None)
@@ -270,35 +267,8 @@ def probe_vdb(path: str | os.PathLike) -> dict:
     tells them ``active_voxels``, ``first_node`` and ``last_node``; ``problem`` says why a grid
     cannot be read. ``default_grid`` is the one that `read_vdb` takes.
     """
-    with _opened(path) as reader:
+    with opened_reader(path) as reader:
         return file_facts(read_headers(reader))
-
-
-@contextmanager
-def _opened(path: str | os.PathLike) -> Iterator[VdbReader]:
-    """A reader of a file; what it finds wrong becomes IoError."""
-    path = checked_input(path)
-    try:
-        with open(path, "rb") as file:
-            yield VdbReader(file, os.fstat(file.fileno()).st_size)
-    except UnsuitedError as error:
-        raise IoError(f"{path.name}: {error}", f"file {path}", error.fix) from error
-    except GridError as error:
-        raise _unreadable(path, error.what) from error
-    except MemoryError as error:
-        raise _unreadable(path, "it does not fit in memory") from error
-    except OSError as error:
-        raise _unreadable(path, error.strerror or str(error)) from error
-    except ValueError as error:
-        raise _unreadable(path, str(error)) from error
-
-
-def _unreadable(path: Path, reason: str) -> IoError:
-    return IoError(
-        f"{path.name} is not a readable volume: {' '.join(reason.split())[:300]}",
-        f"file {path}",
-        "write it again; if it was copied, copy it again",
-    )
 
 
 def _unwritable(error: ValueError, where: str) -> IoError:

@@ -20,7 +20,8 @@ from ..errors import IoError
 from ..grid import Grid, NarrowBand
 from .atomic import atomic_write, check_output
 from .dense_form import dense_form
-from .dense_header import DenseHeader, opened
+from .dense_header import DenseHeader
+from .opened import opened
 from .unpacking import check_claim
 from .vdb_stream import UnsuitedError, printable
 from .warn import Warn, ignore

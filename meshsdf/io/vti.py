@@ -17,7 +17,8 @@ from ..errors import IoError
 from ..grid import Grid, NarrowBand
 from .atomic import atomic_write
 from .dense_form import dense_form
-from .dense_header import PREFIX, DenseHeader, one_spacing, opened, told_of
+from .dense_header import PREFIX, DenseHeader, one_spacing, told_of
+from .opened import opened
 from .vdb_stream import UnsuitedError, printable
 from .vti_data import ZLIB_NAME, array_values, fact, write_blocks
 from .vti_head import ITEM_TYPES, VtiArray, VtiHead, read_head

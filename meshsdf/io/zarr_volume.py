@@ -9,13 +9,11 @@ comes back as it was. Arrays of others come in as full grids.
 """
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import GridError, IoError
+from ..errors import IoError
 from ..grid import BrickIndex, Grid, NarrowBand
 from .atomic import atomic_folder, check_output
 from .half import check_half, halved
@@ -31,6 +29,7 @@ from .npz import (
     grid_arrays,
     grid_of,
 )
+from .opened import refusing
 from .registry import checked_input, stored_bytes
 from .unpacking import check_claim
 from .vdb_stream import UnsuitedError, printable
@@ -96,7 +95,7 @@ def read_zarr(path: str | os.PathLike) -> NarrowBand | Grid:
         and the package zarr is not installed. No more memory is taken than some 1000 times the
         bytes of the folder, or 64 MiB.
     """
-    with _opened(path) as folder:
+    with refusing(checked_input(path)) as folder:
         attributes = _attributes(folder)
         n_there = stored_bytes(folder)
         if "meshsdf" not in attributes:
@@ -120,7 +119,7 @@ def probe_zarr(path: str | os.PathLike) -> dict:
     Of an array that others wrote: ``kind``, ``format``, ``voxel_size``, ``origin``, ``shape`` and
     ``dtype``. Values are not read.
     """
-    with _opened(path) as folder:
+    with refusing(checked_input(path)) as folder:
         attributes = _attributes(folder)
         if "meshsdf" not in attributes:
             name, voxel_size, origin = placed_array(attributes.get("ome"))
@@ -241,20 +240,3 @@ def _foreign(folder: Path, attributes: dict, n_there: int) -> Grid:
 def _nodes(array: np.ndarray) -> np.ndarray:
     """The array [i, j, k] of an array [k, j, i]."""
     return np.ascontiguousarray(array.transpose(2, 1, 0))
-
-
-@contextmanager
-def _opened(path: str | os.PathLike) -> Iterator[Path]:
-    """The folder; what is found wrong within becomes IoError."""
-    path = checked_input(path)
-    fix = "write it again; if it was copied, copy it again"
-    try:
-        yield path
-    except UnsuitedError as error:
-        raise IoError(f"{path.name}: {error}", f"folder {path}", error.fix) from error
-    except MemoryError as error:
-        raise IoError(f"{path.name} does not fit in memory", f"folder {path}", fix) from error
-    except (OSError, ValueError, GridError) as error:
-        reason = getattr(error, "strerror", None) or getattr(error, "what", None) or str(error)
-        what = f"{path.name} is not a readable volume: {' '.join(reason.split())[:300]}"
-        raise IoError(what, f"folder {path}", fix) from error
