@@ -57,6 +57,10 @@ class RayError(MeshsdfError):
     """A picture cannot be made as asked."""
 
 
+class TextureError(MeshsdfError):
+    """A texture in space cannot be made, changed or kept as asked."""
+
+
 class ReportError(MeshsdfError):
     """Two things cannot be compared as asked."""
 

@@ -1,0 +1,141 @@
+"""Bricks of texels, all channels side by side under one slot number, counted by who needs them."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Int32
+
+from ..errors import TextureError
+from ..kernels.texture_lookup import FIRST_TILE
+from .channels import Channel
+
+Slots = Int32[np.ndarray, " n"]
+
+TEXELS = 512
+FIRST_CAPACITY = 64
+
+
+class BrickPool:
+    """Slots of 512 texels. A channel takes memory from when it is first used.
+
+    Attributes
+    ----------
+    channels : mapping of str to Channel
+        Which there may be.
+    arrays : dict of str to (capacity, 512) array
+        The channels that are used.
+    holders : (capacity,) int32
+        How many need each slot; those that none needs are free.
+    """
+
+    def __init__(self, channels: Mapping[str, Channel]) -> None:
+        self.channels = dict(channels)
+        self.holders = np.zeros(FIRST_CAPACITY, np.int32)
+        self.arrays: dict[str, np.ndarray] = {}
+        self._free: list[int] = list(range(FIRST_CAPACITY - 1, -1, -1))
+        self.use("base")
+
+    @property
+    def n_used(self) -> int:
+        """Slots that somebody needs."""
+        return len(self.holders) - len(self._free)
+
+    @property
+    def n_bytes(self) -> int:
+        """Memory of the used slots."""
+        return self.n_used * sum(array[0].nbytes for array in self.arrays.values())
+
+    def use(self, name: str) -> np.ndarray:
+        """The (capacity, 512) texels of a channel, which takes memory from now on.
+
+        Raises
+        ------
+        TextureError
+            There is no such channel.
+        """
+        if name not in self.channels:
+            what = f"there is no channel {name!r}"
+            raise TextureError(what, "channel=...", f"use one of {', '.join(self.channels)}")
+        if name not in self.arrays:
+            channel = self.channels[name]
+            shape = (len(self.holders), TEXELS)
+            self.arrays[name] = np.full(shape, channel.nothing, channel.dtype)
+        return self.arrays[name]
+
+    def take(self, n: int) -> Slots:
+        """Return n free slots, held once, in which nothing was ever written."""
+        while len(self._free) < n:
+            self._grow()
+        slots = np.array([self._free.pop() for _ in range(n)], np.int32)
+        self.holders[slots] = 1
+        for name, array in self.arrays.items():
+            array[slots] = self.channels[name].nothing
+        return slots
+
+    def copies(self, slots: Slots) -> Slots:
+        """Return new slots, held once, with the texels of others."""
+        taken = self.take(len(slots))
+        for array in self.arrays.values():
+            array[taken] = array[slots]
+        return taken
+
+    def hold(self, slots: Slots) -> None:
+        """One more needs each of those that are slots (>= 0); an array may name one repeatedly."""
+        np.add.at(self.holders, slots[slots >= 0], np.int32(1))
+
+    def drop(self, slots: Slots) -> None:
+        """One fewer needs each of those that are slots; what none needs is free again."""
+        dropped = slots[slots >= 0]
+        np.subtract.at(self.holders, dropped, np.int32(1))
+        unique = np.unique(dropped)
+        self._free.extend(unique[self.holders[unique] == 0][::-1].tolist())
+
+    def _grow(self) -> None:
+        before = len(self.holders)
+        self.holders = np.concatenate([self.holders, np.zeros(before, np.int32)])
+        for name, array in self.arrays.items():
+            # New pages of memory are taken only when they are written
+            grown = np.empty((2 * before, TEXELS), array.dtype)
+            grown[:before] = array
+            self.arrays[name] = grown
+        self._free = list(range(2 * before - 1, before - 1, -1)) + self._free
+
+
+class TilePool:
+    """Colours that whole bricks have: each kept once, named by its code (-2 and below).
+
+    Attributes
+    ----------
+    arrays : dict of str to (capacity,) array
+        Every channel of every tile.
+    """
+
+    def __init__(self, channels: Mapping[str, Channel]) -> None:
+        self.channels = dict(channels)
+        self.arrays = {c.name: np.empty(0, c.dtype) for c in channels.values()}
+        self._codes: dict[bytes, int] = {}
+
+    def __len__(self) -> int:
+        return len(self._codes)
+
+    def code(self, texel: Mapping[str, int | np.integer]) -> int:
+        """The code of a tile of these texels; channels left out hold nothing."""
+        stored = {
+            c.name: np.asarray(texel.get(c.name, c.nothing), c.dtype)
+            for c in self.channels.values()
+        }
+        key = b"".join(value.tobytes() for value in stored.values())
+        if key not in self._codes:
+            row = len(self._codes)
+            self._codes[key] = FIRST_TILE - row
+            if row == len(self.arrays["base"]):
+                for name, array in self.arrays.items():
+                    room = np.zeros(max(16, row), array.dtype)
+                    self.arrays[name] = np.concatenate([array, room])
+            for name, value in stored.items():
+                self.arrays[name][row] = value
+        return self._codes[key]
+
+    def texel(self, code: int) -> dict[str, np.integer]:
+        """The texel of a tile in every channel."""
+        return {name: array[FIRST_TILE - code] for name, array in self.arrays.items()}

@@ -1,0 +1,285 @@
+"""A texture in space: an octree of texels around a surface, painted in layers, without UVs.
+
+DeBry, Gibbs, Petty and Robins 2002 (doi:10.1145/566654.566649) and Benson and Davis 2002
+(doi:10.1145/566654.566652) keep colours in an octree around the surface; here the octree's nodes
+are bricks, found through the page table that distance bands use, too.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float32, Float64
+
+from ..arrays import Number, Points
+from ..errors import TextureError
+from ..kernels.parallel import even_ranges, run_pieces
+from ..kernels.texel_places import put_texels, texel_places, uniform_entries
+from ..kernels.texture_lookup import ABSENT
+from ..mesh import Mesh
+from ..progress import Progress, silent
+from ..spatial import ClosestPoint
+from .channels import Numbers, channels_with
+from .layer import Layer
+from .lookup import Footprint, look_up
+from .octree import Entries, Octree
+from .pool import BrickPool, TilePool
+
+Normals = Float64[np.ndarray, "n 3"]
+Color = tuple[Number, ...] | list[Number] | Float32[np.ndarray, "c"]
+TextureFunction = Callable[..., Numbers]
+
+ENTRIES_PER_PIECE = 512
+
+
+class VolumeTexture:
+    """Colours (and more) of a surface, kept by position in space.
+
+    Parameters
+    ----------
+    octree : Octree
+        Where texels are.
+    base : "srgb8" or "half"
+        How base colours are kept: 8 bits in sRGB, or linear in half precision.
+
+    Attributes
+    ----------
+    octree : Octree
+    pool, tiles : BrickPool, TilePool
+        The texels of all layers.
+    layers : list of Layer
+        Bottom first. Change them through `add_layer`, `drop_layer` and their own attributes.
+    surface : Mesh or None
+        What the texture was made around; `colors(project=True)` looks up its closest points.
+    """
+
+    def __init__(self, octree: Octree, *, base: str = "srgb8") -> None:
+        self.octree = octree
+        self.channels = channels_with(base)
+        self.base = base
+        self.pool = BrickPool(self.channels)
+        self.tiles = TilePool(self.channels)
+        self.layers: list[Layer] = []
+        self.surface: Mesh | None = None
+        self._closest: ClosestPoint | None = None
+        self._next_number = 0
+
+    @classmethod
+    def around(
+        cls,
+        mesh: Mesh,
+        *,
+        resolution: Number | None = None,
+        texel: Number | None = None,
+        base: str = "srgb8",
+        progress: Progress = silent,
+    ) -> "VolumeTexture":
+        """An empty texture with the texels that a mesh needs; errors as `Octree.around`."""
+        octree = Octree.around(mesh, resolution=resolution, texel=texel, progress=progress)
+        texture = cls(octree, base=base)
+        texture.surface = mesh
+        return texture
+
+    def add_layer(self, name: str = "", *, color: Color = (0.0, 0.0, 0.0, 0.0)) -> Layer:
+        """Put a new layer on top, of one linear colour with alpha all over."""
+        slots = np.full(self.octree.n_entries, ABSENT, np.int32)
+        slots[self.octree.level_first[-2] :] = self.tiles.code({"base": self.encoded_color(color)})
+        number, self._next_number = self._next_number, self._next_number + 1
+        layer = Layer(number, name or f"layer {number + 1}", slots)
+        self.layers.append(layer)
+        return layer
+
+    def drop_layer(self, layer: Layer) -> None:
+        """Take a layer away, with its texels."""
+        self.layers.remove(layer)
+        self.pool.drop(layer.slots)
+
+    def encoded_color(self, color: Color) -> np.integer:
+        """The texel of a linear colour; alpha is 1 if it has none.
+
+        Raises
+        ------
+        TextureError
+            It has not 3 or 4 numbers, or they are not finite.
+        """
+        values = np.asarray(color, np.float32)
+        if values.shape not in ((3,), (4,)) or not np.isfinite(values).all():
+            what = f"{color} is no colour"
+            raise TextureError(what, "color=...", "give 3 or 4 finite numbers: linear RGB, alpha")
+        rgba = np.ones((1, 4), np.float32)
+        rgba[0, : len(values)] = values
+        return self.channels["base"].encoded(rgba)[0]
+
+    def colors(
+        self,
+        points: Points,
+        normals: Normals | None = None,
+        footprint: Footprint = 0.0,
+        *,
+        channel: str = "base",
+        layer: Layer | None = None,
+        project: bool = False,
+    ) -> Numbers:
+        """What the texture shows at points.
+
+        Parameters
+        ----------
+        points : (n, 3) float64
+            In the texture's space, on the surface or next to it.
+        normals : (n, 3) float64, optional
+            Which way the surface looks there, of any length: it tells the two sides of thin parts
+            apart. Without them the first side answers.
+        footprint : float or (n,) float64
+            Width to average over, world units; finest texels if 0.
+        channel : str
+            "base", "normal", "height", "orm" or "mask".
+        layer : Layer, optional
+            Of this layer alone; else of all that are visible, blended.
+        project : bool
+            Look up the closest point of the surface (and its normal) in place of the point.
+
+        Returns
+        -------
+        (n, 4) float32
+            Linear RGB (or the channel's values) and alpha (or coverage); NaN where a point is not
+            finite. Continuous along the surface, but where sheets part.
+
+        Raises
+        ------
+        TextureError
+            There is no such channel, or nothing to project to.
+        """
+        if channel not in self.channels:
+            what = f"there is no channel {channel!r}"
+            raise TextureError(what, "channel=...", f"use one of {', '.join(self.channels)}")
+        if project:
+            points, normals = self.on_surface(points)
+        slots = (layer or self._shown()).slots
+        pool = self.pool.arrays.get(channel)
+        kind = self.channels[channel]
+        if pool is None:
+            pool = np.zeros((1, 1), kind.dtype)
+            slots = np.where(slots >= 0, self._nothing(), slots)
+        return look_up(
+            self.octree, slots, pool, self.tiles.arrays[channel], kind.kind, points, normals,
+            footprint,
+        )  # fmt: skip
+
+    def on_surface(self, points: Points) -> tuple[Points, Normals]:
+        """The closest points of the surface, and the normals of the faces they lie on.
+
+        Raises
+        ------
+        TextureError
+            The texture knows of no surface.
+        """
+        if self.surface is None:
+            what = "the texture does not know its surface"
+            raise TextureError(what, "project=True", "set texture.surface to the mesh")
+        if self._closest is None or self._closest.mesh is not self.surface:
+            self._closest = ClosestPoint(self.surface)
+        found = self._closest(points)
+        corners = self.surface.vertices[self.surface.faces[found.face_index]]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return found.point, normals
+
+    def places(self, entries: Entries) -> tuple[Points, Normals]:
+        """Positions and unit normals (n, 3) of the texels of entries, one entry after another."""
+        first = self._first(entries)
+        points, normals = np.empty((first[-1], 3)), np.empty((first[-1], 3))
+        ranges = even_ranges(len(entries), -(-len(entries) // ENTRIES_PER_PIECE))
+        run_pieces(
+            lambda piece: texel_places(
+                self.octree.tables, entries, first, *ranges[piece], points, normals
+            ),
+            len(ranges) if len(entries) else 0,
+        )
+        return points, normals
+
+    def put(
+        self, layer: Layer, entries: Entries, values: Numbers, *, channel: str = "base"
+    ) -> None:
+        """Store values, in the order of `places`, in bricks of a layer (each entry once).
+
+        What was stored in those bricks' other channels stays. Bricks that other holders need, too,
+        are copied first. Coarser levels are not brought up to date: see `mip.update_mips`.
+        """
+        slots = self.writable(layer, entries)
+        first = self._first(entries)
+        pool = self.pool.use(channel)
+        kind = self.channels[channel].kind
+        ranges = even_ranges(len(entries), -(-len(entries) // ENTRIES_PER_PIECE))
+        run_pieces(
+            lambda piece: put_texels(
+                self.octree.tables, entries, slots, first, *ranges[piece], kind, values, pool
+            ),
+            len(ranges) if len(entries) else 0,
+        )
+
+    def writable(self, layer: Layer, entries: Entries) -> np.ndarray:
+        """Slots of the entries that this layer alone needs, made from what it stores there.
+
+        A tile becomes a brick of its colour; a brick that others hold is copied; an entry that is
+        not stored gets a brick in which nothing was written.
+        """
+        slots = layer.slots[entries]
+        fresh = slots < 0
+        shared = np.zeros(len(slots), bool)
+        shared[~fresh] = self.pool.holders[slots[~fresh]] > 1
+        if fresh.any():
+            taken = self.pool.take(int(fresh.sum()))
+            self._spread_tiles(slots[fresh], taken)
+            slots[fresh] = taken
+        if shared.any():
+            old = slots[shared]
+            slots[shared] = self.pool.copies(old)
+            self.pool.drop(old)
+        layer.slots[entries] = slots
+        return slots
+
+    def collapse_uniform(self, layer: Layer, entries: Entries) -> None:
+        """Turn those of the entries whose texels all hold the same numbers into tiles."""
+        entries = entries[layer.slots[entries] >= 0]
+        slots = layer.slots[entries]
+        uniform = np.ones(len(entries), bool)
+        ranges = even_ranges(len(entries), -(-len(entries) // ENTRIES_PER_PIECE))
+        for array in self.pool.arrays.values():
+            one = np.empty(len(entries), bool)
+            run_pieces(
+                lambda piece, array=array, one=one: uniform_entries(
+                    self.octree.tables, entries, slots, array, *ranges[piece], one
+                ),
+                len(ranges) if len(entries) else 0,
+            )
+            uniform &= one
+        for entry, slot in zip(entries[uniform], slots[uniform], strict=True):
+            t = first_texel(self.octree.tables.masks[entry])
+            texel = {name: array[slot, t] for name, array in self.pool.arrays.items()}
+            layer.slots[entry] = self.tiles.code(texel)
+        self.pool.drop(slots[uniform])
+
+    def _spread_tiles(self, codes: np.ndarray, taken: np.ndarray) -> None:
+        for code in np.unique(codes[codes != ABSENT]):
+            for name, value in self.tiles.texel(int(code)).items():
+                if name in self.pool.arrays or value != self.channels[name].nothing:
+                    self.pool.use(name)[taken[codes == code]] = value
+
+    def _first(self, entries: Entries) -> np.ndarray:
+        first = self.octree.tables.texel_first
+        return np.concatenate([[0], np.cumsum(first[entries + 1] - first[entries])])
+
+    def _shown(self) -> Layer:
+        if len(self.layers) != 1:
+            raise TextureError(
+                f"the texture has {len(self.layers)} layers", "colors()", "name the layer"
+            )
+        return self.layers[0]
+
+    def _nothing(self) -> int:
+        return self.tiles.code({})
+
+
+def first_texel(mask: np.ndarray) -> int:
+    """The first texel that exists by an entry's (8,) mask."""
+    i = int(np.flatnonzero(mask)[0])
+    word = int(mask[i])
+    return 64 * i + (word & -word).bit_length() - 1
