@@ -4,6 +4,7 @@ Exit codes: 0 done, the answer is yes; 1 done, the answer is no; 2 misuse; 3 the
 used or would not fit in memory; 130 interrupted.
 """
 
+import gc
 import os
 import signal
 import sys
@@ -28,6 +29,7 @@ COMMANDS = {
     "render": "Draw a mesh or a volume, or how far it is from another mesh.",
     "demo": "Make a mesh, check, convert and round-trip it, and draw pictures.",
 }
+GARBAGE_AFTER = 50_000  # new objects: imports make far more, and nearly all of them stay
 
 
 class LazyGroup(click.Group):
@@ -94,6 +96,7 @@ def main() -> None:
     """Entry point of the console script."""
     if sys.stdout is not None:
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be any bytes
+    gc.set_threshold(GARBAGE_AFTER)
     warnings.simplefilter("ignore", RuntimeWarning)  # overflow is judged where it matters
     signal.signal(signal.SIGINT, _on_ctrl_c)
     code = run(sys.argv[1:])

@@ -18,6 +18,7 @@ from ..mesh import Material, Mesh
 from ..srgb import linear_rgba, srgb_rgba
 from .mtl import read_materials
 from .obj_faces import Defined, corner_indices
+from .obj_plain import read_plain_obj
 from .polygons import checked_faces, fan_corners
 from .text_rows import Rows, rows, token_counts
 from .warn import Warn
@@ -29,7 +30,11 @@ _LIBRARIES = re.compile(rb"^[ \t]*mtllib[ \t]+([^\n]*)", re.MULTILINE)
 
 def read_obj(path: Path, warn: Warn) -> Mesh:
     """Read an OBJ file; ValueError says what is wrong with it."""
-    text = path.read_bytes().replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    text = path.read_bytes()
+    mesh = read_plain_obj(text, warn)
+    if mesh is not None:
+        return mesh
+    text = text.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     if b"\n" not in text:
         text = text.replace(b"\r", b"\n")
     places = rows(_lines(text, b"v"), "vertex line")

@@ -67,10 +67,10 @@ def sky_sums(
 
 @njit(cache=True, nogil=True)
 def mean_sums(
-    columns, rows, points, normals, lifts, sums, own, begin, end, back, reach, index, near_points,
+    columns, rows, points, normals, lifts, begin, end, back, reach, index, near_points,
     near_normals, near_sums, result,
 ):  # fmt: skip
-    """``result[q]`` = mean of ``near_sums`` around q, and of ``sums[q]`` with the weight ``own``.
+    """``result[q]`` = mean of ``near_sums`` around q; zero where no neighbour counts.
 
     ``index[row, column]`` is the place of a pixel in the ``near`` arrays, or -1. The block begins
     ``back`` pixels before q's. A neighbour counts the less, the farther it lies from the plane
@@ -78,7 +78,7 @@ def mean_sums(
     """
     height, width = index.shape
     for q in range(begin, end):
-        everything, arriving, total = own * sums[q, 0], own * sums[q, 1], own
+        everything = arriving = total = 0.0
         scale = 1.0 / (reach * lifts[q])
         top, left = rows[q] - back, columns[q] - back
         for row in range(max(top, 0), min(top + SIDE, height)):

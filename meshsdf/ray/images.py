@@ -9,6 +9,7 @@ from ..srgb import srgb_from_linear
 
 Picture = Float32[np.ndarray, "h w 4"]
 N_STEPS = 2**16 - 1
+COMPRESSION = 4  # of 9: a shaded mesh is 4 % larger than by 6, in half the time
 
 
 def png_bytes(picture: Picture) -> bytes:
@@ -25,7 +26,7 @@ def png_bytes(picture: Picture) -> bytes:
     if (pixels[..., 3] == 255).all():
         pixels = np.ascontiguousarray(pixels[..., :3])
     out = BytesIO()
-    Image.fromarray(pixels).save(out, "PNG")
+    Image.fromarray(pixels).save(out, "PNG", compress_level=COMPRESSION)
     return out.getvalue()
 
 

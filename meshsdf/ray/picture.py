@@ -19,10 +19,11 @@ from .shading import N_SETS, shade
 Picture = Float32[np.ndarray, "h w 4"]
 Turns = Int64[np.ndarray, " k"]
 
-TILE = 64  # pixels: rays of a tile stay near each other in the tree
+TILE = 16  # pixels: rays of a tile stay near each other in the tree
+NEAR = 1e-6  # of the largest depth: where points nearer than that appear is not known well
 CONTRAST = 0.05  # of square roots of linear colour: neighbours that differ more are an edge
 EDGES_AT_ONCE = 2**16
-EDGE_RAYS = 1  # to the sky, per place on an edge
+EDGE_RAYS = 1  # to the sky, per place on an edge that needs them
 MOST_PIXELS = 2**28
 MOST_SAMPLES = 16
 
@@ -84,8 +85,9 @@ def render_mesh(
     -----
     Accuracy: the nearest face at every place is exact (`spatial.ray_hits`), and so is ``paint``
     there. Parts thinner than a pixel that fall between middles and touch no edge are missed.
-    Cost: a ray per pixel before the mesh, 4 short rays per pixel on it, ``2 samples²`` more per
-    pixel on edges. The same bytes with any number of threads.
+    Cost: a ray per pixel near the mesh, 4 short rays per pixel on it, ``samples²`` more per pixel
+    on edges, and as many short ones where no light of a middle is near. The same bytes with any
+    number of threads.
 
     References
     ----------
@@ -139,7 +141,7 @@ class _Studio:
         progress: Progress,
     ) -> Seen:
         """What is seen at places within pixels; those of a 4 x 4 block have different rays."""
-        sets = (pixels[:, 0] % 4 + 4 * (pixels[:, 1] % 4) + turn) % N_SETS
+        sets = _sets(pixels, turn)
         options = {"n_rays": n_rays if self.has_sky else 0, "progress": progress}
         return self.scene.look(self.camera, self.size, places, sets, **options)
 
@@ -148,11 +150,19 @@ class _Studio:
         if self.has_sky:
             self.light = Skylight(middles, pixels, self.size)
 
-    def colors(self, seen: Seen, pixels: PixelIndices) -> Float32[np.ndarray, "k 3"]:
+    def colors(
+        self, seen: Seen, pixels: PixelIndices, turn: int | Turns = 0
+    ) -> Float32[np.ndarray, "k 3"]:
         """The linear colours of what is seen in pixels."""
         shares = np.ones(len(seen))
         if self.light is not None:
-            shares = self.light.shares(seen, pixels)
+            sets = _sets(pixels, turn)
+
+            def send(alone: np.ndarray) -> np.ndarray:
+                few = seen.take(alone)
+                return self.scene.send_rays(few, sets[alone], self.camera, n_rays=EDGE_RAYS)
+
+            shares = self.light.shares(seen, pixels, send)
         albedo, colors = self.paint(seen), np.empty((len(seen), 3), np.float32)
         pieces = even_ranges(len(seen), len(seen) // PER_PIECE + 1)
 
@@ -167,23 +177,49 @@ class _Studio:
         return colors
 
 
+def _sets(pixels: PixelIndices, turn: int | Turns) -> Turns:
+    """Which set of rays to the sky each place within pixels has."""
+    return (pixels[:, 0] % 4 + 4 * (pixels[:, 1] % 4) + turn) % N_SETS
+
+
 def _pixels_before(mesh: Mesh, camera: Camera, width: int, height: int) -> PixelIndices:
-    """The pixels (x, y) that the mesh's box may touch, tile by tile."""
-    corners = np.indices((2, 2, 2)).reshape(3, 8).T
-    box = mesh.box
-    seen, depth = camera.project(np.where(corners == 0, box.lower, box.upper), width, height)
-    lower, upper = np.zeros(2, np.int64), np.array([width, height])
-    if (depth > 0).all():
-        # A pixel more, for rounding
-        lower = np.clip(np.floor(seen.min(axis=0)) - 1, 0, upper).astype(np.int64)
-        upper = np.clip(np.ceil(seen.max(axis=0)) + 1, 0, upper).astype(np.int64)
-    tiles = []
-    for top in range(lower[1], upper[1], TILE):
-        rows = np.arange(top, min(top + TILE, upper[1]))
-        for left in range(lower[0], upper[0], TILE):
-            columns = np.arange(left, min(left + TILE, upper[0]))
-            tiles.append(np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2))
-    return np.concatenate(tiles) if tiles else np.empty((0, 2), np.int64)
+    """The pixels (x, y) that the mesh may touch, tile by tile."""
+    rows, columns = np.nonzero(_tiles_before(mesh, camera, width, height))
+    within = np.stack(np.meshgrid(np.arange(TILE), np.arange(TILE)), axis=-1).reshape(-1, 2)
+    pixels = (TILE * np.column_stack([columns, rows])[:, None] + within).reshape(-1, 2)
+    if width % TILE or height % TILE:
+        pixels = pixels[(pixels < [width, height]).all(axis=1)]
+    return pixels
+
+
+def _tiles_before(
+    mesh: Mesh, camera: Camera, width: int, height: int
+) -> Bool[np.ndarray, "rows columns"]:
+    """The tiles that the boxes of the faces, as they appear in the picture, touch."""
+    shape = -(-height // TILE), -(-width // TILE)
+    places, depth = camera.project(mesh.vertices, width, height)
+    is_used = np.zeros(mesh.n_vertices, bool)
+    is_used[mesh.faces] = True
+    if not depth[is_used].min() > NEAR * np.abs(depth[is_used]).max():
+        return np.ones(shape, bool)
+    corners = places[mesh.faces]
+    # A pixel more, for rounding
+    lower, upper = corners.min(axis=1) - 1.0, corners.max(axis=1) + 1.0
+    is_before = ((upper >= 0) & (lower <= [width, height])).all(axis=1)
+    last = np.array(shape[::-1]) - 1
+    first = np.clip(lower[is_before] // TILE, 0, last).astype(np.int64)
+    behind = np.clip(upper[is_before] // TILE, 0, last).astype(np.int64) + 1
+    # Each box adds 1 from its first tile on and takes it away behind its last
+    n_columns = shape[1] + 1
+    change = np.zeros((shape[0] + 1) * n_columns)
+    for x, y, sign in (
+        (first, first, 1),
+        (behind, behind, 1),
+        (first, behind, -1),
+        (behind, first, -1),
+    ):
+        change += sign * np.bincount(y[:, 1] * n_columns + x[:, 0], minlength=len(change))
+    return change.reshape(-1, n_columns).cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
 
 
 def _edges(picture: Picture) -> Bool[np.ndarray, "h w"]:
@@ -208,9 +244,9 @@ def _refine(
     owner = np.repeat(np.arange(n), n_places)
     places = (edges[:, None] + within).reshape(-1, 2)
     turns = np.tile(np.arange(n_places), n)
-    seen = studio.look(places, edges[owner], turns, EDGE_RAYS, progress)
+    seen = studio.look(places, edges[owner], turns, 0, progress)
     owner = owner[seen.place]
-    colors = studio.colors(seen, edges[owner])
+    colors = studio.colors(seen, edges[owner], turns[seen.place])
     count = np.bincount(owner, minlength=n)
     for channel in range(3):
         total = np.bincount(owner, weights=colors[:, channel], minlength=n)

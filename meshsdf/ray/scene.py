@@ -1,6 +1,6 @@
 """What is seen through places of a picture: points, faces, normals, and rays to the sky."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -20,7 +20,6 @@ N_RAYS = 4  # to the sky, per pixel
 LONGEST = 0.5  # of the box's diagonal: how far away things cast shadows
 LIFT = 0.25  # of a pixel: where rays to the sky start above the surface
 LEAST_LIFT = 1e-7  # of the box's diagonal
-OWN = 0.25  # weight of a place's own rays beside the mean around a pixel
 REACH = 12.0  # lifts: neighbours so far from the tangent plane lie elsewhere
 PER_PIECE = 8192
 
@@ -29,6 +28,7 @@ Numbers = Float64[np.ndarray, " k"]
 Sets = Int64[np.ndarray, " k"]
 Sums = Float64[np.ndarray, "k 2"]
 PixelIndices = Int64[np.ndarray, "k 2"]
+Send = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +65,10 @@ class Seen:
 
     def __len__(self) -> int:
         return len(self.place)
+
+    def take(self, which: Int64[np.ndarray, " few"]) -> "Seen":
+        """Return some of the places."""
+        return Seen(*(getattr(self, field.name)[which] for field in fields(Seen)))
 
 
 class Scene:
@@ -128,7 +132,7 @@ class Scene:
             begin, end = pieces[piece]
             seen = self._look(camera, size, pixels[begin:end], begin)
             if n_rays > 0:
-                self._send_rays(seen, sets[seen.place], directions, light)
+                self._send_rays(seen, sets[seen.place], 0, len(seen), directions, light)
             parts[piece] = seen
 
         run_pieces(work, len(pieces), stage="rays", progress=progress)
@@ -158,15 +162,28 @@ class Scene:
             np.zeros((len(place), 2)),
         )
 
+    def send_rays(self, seen: Seen, sets: Sets, camera: Camera, *, n_rays: int) -> Sums:
+        """Return ``sums``, the sky's light along rays, of places that were seen without."""
+        light, directions = sky(camera), ray_sets(n_rays)
+        pieces = even_ranges(len(seen), len(seen) // PER_PIECE + 1)
+
+        def work(piece: int) -> None:
+            self._send_rays(seen, sets, *pieces[piece], directions, light)
+
+        run_pieces(work, len(pieces))
+        return seen.sums
+
     def _send_rays(
         self,
         seen: Seen,
         sets: Sets,
+        begin: int,
+        end: int,
         directions: Float64[np.ndarray, "s r 3"],
         light: Float64[np.ndarray, "9"],
     ) -> None:
         sky_sums(
-            *(seen.point, seen.normal, seen.facet, seen.lift, sets, 0, len(seen)),
+            *(seen.point, seen.normal, seen.facet, seen.lift, sets, begin, end),
             *(self.rays.center, LONGEST * 2.0 * self.rays.radius, directions, light),
             *(self.rays.corners, *self.rays.tree, seen.sums),
         )
@@ -190,26 +207,27 @@ class Skylight:
         self.index = np.full(size[::-1], -1, np.int32)
         self.index[pixels[:, 1], pixels[:, 0]] = np.arange(len(middles), dtype=np.int32)
         # Twice: a block around, then one around those, the other way round
-        self.means = self._means(middles, pixels, middles.sums, back=2, own=0.0)
-        self.smooth = self._means(middles, pixels, self.means, back=1, own=0.0)
+        self.means = self._means(middles, pixels, middles.sums, back=2)
+        self.smooth = self._means(middles, pixels, self.means, back=1)
 
-    def shares(self, seen: Seen, pixels: PixelIndices) -> Numbers:
-        """Return how much of the sky's light arrives, from 0 to 1, at places within pixels."""
+    def shares(self, seen: Seen, pixels: PixelIndices, send: Send | None = None) -> Numbers:
+        """Return how much of the sky's light arrives, from 0 to 1, at places within pixels.
+
+        Only places that lie beside no middle on the same piece of surface need rays of their own:
+        ``send`` gets their numbers and returns their sums.
+        """
         sums = self.smooth
         if seen is not self.middles:
-            sums = self._means(seen, pixels, self.means, back=2, own=OWN)
+            sums = self._means(seen, pixels, self.means, back=2)
+            alone = np.flatnonzero(sums[:, 0] == 0)
+            if len(alone) and send is not None:
+                sums[alone] = send(alone)
         everything = sums[:, 0]
         lit = everything > 0
         return np.where(lit, sums[:, 1] / np.where(lit, everything, 1.0), 1.0)
 
     def _means(
-        self,
-        seen: Seen,
-        pixels: PixelIndices,
-        sums: Float64[np.ndarray, "near 2"],
-        *,
-        back: int,
-        own: float,
+        self, seen: Seen, pixels: PixelIndices, sums: Float64[np.ndarray, "near 2"], *, back: int
     ) -> Sums:
         n = len(seen)
         result = np.empty((n, 2))
@@ -218,7 +236,7 @@ class Skylight:
 
         def work(piece: int) -> None:
             mean_sums(
-                *(columns, rows, seen.point, seen.normal, seen.lift, seen.sums, own),
+                *(columns, rows, seen.point, seen.normal, seen.lift),
                 *(*pieces[piece], back, REACH, self.index),
                 *(self.middles.point, self.middles.normal, sums, result),
             )

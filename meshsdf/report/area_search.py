@@ -147,10 +147,14 @@ class AreaSearch:
         return inside
 
     def _allowed(self, mean: float, square: float) -> Float64[np.ndarray, "2"]:
-        """Gaps of mean and mean square within which mean and rms are as narrow as asked."""
-        rms = float(np.sqrt(max(square, 0.0)))
+        """Gaps of mean and mean square within which mean and rms are as narrow as asked.
+
+        A part of a length below the rounding is that part of the rounding, so none is zero.
+        """
+        least = self.ruler.rounding
+        rms = max(float(np.sqrt(max(square, 0.0))), least)
         width = self.tolerance.width(rms)
-        return np.array([self.tolerance.width(max(mean, 0.0)), (2.0 * rms + width) * width])
+        return np.array([self.tolerance.width(max(mean, least)), (2.0 * rms + width) * width])
 
 
 def first_thresholds(distances: np.ndarray, size: float) -> Values:

@@ -103,12 +103,12 @@ def plane_of(height, width):
     return points, columns, rows, index
 
 
-def means_of(points, columns, rows, index, normals, sums, *, back=2, own=0.0):
+def means_of(points, columns, rows, index, normals, sums, *, back=2):
     n = len(points)
     result = np.empty((n, 2))
     lifts = np.full(n, 0.25)
     mean_sums(
-        *(columns, rows, points, normals, lifts, sums, own, 0, n, back, 12.0),
+        *(columns, rows, points, normals, lifts, 0, n, back, 12.0),
         *(index, points, normals, sums, result),
     )
     return result
@@ -122,9 +122,10 @@ def test_means_are_those_of_the_4_x_4_pixels_on_the_same_plane():
     image = sums.reshape(9, 11, 2)
     assert_allclose(result[5, 6], image[3:7, 4:8].mean(axis=(0, 1)), atol=1e-15)
     assert_allclose(result[0, 0], image[:2, :2].mean(axis=(0, 1)), atol=1e-15)
-    other = means_of(points, columns, rows, index, normals, sums, back=1, own=1.0)
-    block = image[4:8, 5:9].sum(axis=(0, 1)) + image[5, 6]
-    assert_allclose(other.reshape(9, 11, 2)[5, 6], block / 17, atol=1e-15)
+    other = means_of(points, columns, rows, index, normals, sums, back=1)
+    assert_allclose(other.reshape(9, 11, 2)[5, 6], image[4:8, 5:9].mean(axis=(0, 1)), atol=1e-15)
+    nothing = means_of(points, columns, rows, np.full_like(index, -1), normals, sums)
+    assert (nothing == 0).all()
 
 
 def test_pixels_beyond_a_step_a_corner_or_a_hole_do_not_count():

@@ -12,7 +12,7 @@ from meshsdf.errors import RayError, SpatialError
 from meshsdf.mesh import Material, Mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere
 from meshsdf.mesh.tubes import trefoil_tube
-from meshsdf.ray import Camera, Scene, frame, jpeg_bytes, png_bytes, render_mesh
+from meshsdf.ray import Camera, Scene, frame, jpeg_bytes, picture, png_bytes, render_mesh
 from meshsdf.srgb import srgb_from_linear
 
 BALL = icosphere(subdivisions=5)
@@ -181,6 +181,24 @@ def test_the_same_bytes_with_any_number_of_threads(monkeypatch):
     again = render_mesh(KNOT, **SMALL)
     assert once.tobytes() == again.tobytes()
     assert png_bytes(once) == png_bytes(again)
+
+
+def test_tiles_that_no_face_touches_are_left_out_and_change_nothing(monkeypatch):
+    close = Camera(np.array([0.0, 0.3, 6.0]), np.array([1.5, 0.0, 0.0]), field_of_view=12)
+    cameras = [frame(KNOT, "top"), frame(KNOT, (20.0, 30.0)), front(1.0), close]
+    for camera in cameras:
+        for width, height in ((161, 67), (16, 16), (5, 90)):
+            size = {"width": width, "height": height}
+            some = picture._pixels_before(KNOT, camera, width, height)
+            drawn = render_mesh(KNOT, camera, **size)
+            with monkeypatch.context() as patch:
+                patch.setattr(picture, "NEAR", np.inf)  # then no face's place is trusted
+                every = picture._pixels_before(KNOT, camera, width, height)
+                assert_array_equal(drawn, render_mesh(KNOT, camera, **size))
+            assert len(np.unique(every, axis=0)) == width * height
+            assert len(np.unique(some, axis=0)) == len(some) <= len(every)
+    wide = picture._pixels_before(KNOT, cameras[0], 640, 160)
+    assert len(wide) < 0.5 * 640 * 160
 
 
 def test_what_the_camera_does_not_see_leaves_the_picture_empty():

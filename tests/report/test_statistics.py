@@ -245,6 +245,25 @@ def test_a_budget_leaves_wider_intervals_that_are_still_true():
     assert spent[0][1] > spent[1][1] > spent[2][1]
 
 
+@pytest.mark.parametrize("relative", [1e-6, 0.01, 1.0])
+def test_a_part_of_no_distance_at_all_is_reached(relative):
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    one, other = [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]
+    halves = [Mesh(square, np.array(faces, np.int32)) for faces in (one, other)]
+    for source, target in (halves, (box_mesh(), box_mesh())):
+        told = []
+        found = one_sided_statistics(
+            source,
+            target,
+            tolerance=Tolerance(relative=relative),
+            progress=lambda stage, share, told=told: told.append(share),
+        )
+        assert found.is_within_tolerance
+        assert found.mean.lower == found.rms.lower == 0
+        assert max(found.mean.upper, found.rms.upper) < 1e-11  # rounding of coordinates up to 1
+        assert np.isfinite(told).all()
+
+
 def test_the_same_call_gives_the_same_bits():
     source, target = PAIRS["rough spheres"]
     one, two = (one_sided_statistics(source, target) for _ in range(2))

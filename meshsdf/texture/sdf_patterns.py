@@ -1,0 +1,270 @@
+"""Textures that see the shape they are on: worn edges, dirt in cavities, thin parts.
+
+They need no baked maps, as everything is asked of a signed distance ``f(points) -> values``,
+negative inside: an `Implicit`, an interpolated grid, or
+``lambda points: MeshDistance(mesh)(points).distance`` with the object made once. Curvature is right
+for any function with that zero set; occlusion and thickness want distances, or bounds of them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Number, Points, Values
+from ..errors import TextureError
+from .colors import Color, StraightRgba, blend, premultiplied, straight
+from .parameters import check_parameters, means
+from .waves import smoothstep
+
+SignedDistance = Callable[[Points], Any]
+
+TAPS = 5  # along the normal
+MOST_STEPS = 256  # of sphere tracing: each halves the way left, or crosses the shape
+CLOSE = 1e-9  # of the largest thickness: near enough to the far side
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _OnShape:
+    """A texture of two colours, the second by a weight that the shape gives."""
+
+    distance: SignedDistance
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+
+    def __call__(self, points: Points, footprint: Number | Values = 0.0) -> StraightRgba:
+        """Return colours, (n, 4) float32, linear; filters finer than the reach change nothing."""
+        widths = np.broadcast_to(np.asarray(footprint, np.float64), len(points))
+        first, second = self._color_pair()
+        return straight(blend(first, second, self.weight(points, widths)))
+
+    def weight(self, points: Points, footprint: Number | Values = 0.0) -> Values:
+        """Return the share of the second colour, (n,) in [0, 1]; also a weight for `mix`."""
+        raise NotImplementedError
+
+    def _color_pair(self) -> tuple[np.ndarray, np.ndarray]:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EdgeWear(_OnShape):
+    """Bare where the shape bends outwards: by `mean_curvature`, the paint is gone from edges.
+
+    ``smoothstep(0, 2 threshold, kappa * reach)``, kappa measured over ``reach``, or over half the
+    footprint where that is more.
+    """
+
+    reach: Number = field(
+        default=0.02, metadata=means("length", "distance over which the bend is measured")
+    )
+    threshold: Number = field(
+        default=0.3, metadata=means("length", "bend (curvature times reach) that wears half")
+    )
+    paint: Color = field(default="#35566b", metadata=means("color", "of the paint"))
+    bare: Color = field(default="#b9b4ab", metadata=means("color", "of what is under it"))
+
+    def weight(self, points: Points, footprint: Number | Values = 0.0) -> Values:
+        """Return how much is worn off, (n,) in [0, 1]."""
+        step = np.maximum(self.reach, np.asarray(footprint, np.float64) / 2)
+        kappa = mean_curvature(self.distance, points, step)
+        return smoothstep(0, 2 * self.threshold, kappa * step)
+
+    def _color_pair(self) -> tuple[np.ndarray, np.ndarray]:
+        return premultiplied(self.paint), premultiplied(self.bare)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CavityDirt(_OnShape):
+    """Dirt where the surroundings stand close: by `occlusion`, times ``strength``."""
+
+    reach: Number = field(
+        default=0.1, metadata=means("length", "how far out the surroundings count")
+    )
+    strength: Number = field(default=1.5, metadata=means("length", "dirt per share of occlusion"))
+    clean: Color = field(default="#c8b89a", metadata=means("color", "of the clean surface"))
+    dirt: Color = field(default="#33281d", metadata=means("color", "of the dirt"))
+
+    def weight(self, points: Points, footprint: Number | Values = 0.0) -> Values:
+        """Return how dirty it is, (n,) in [0, 1]."""
+        reach = np.maximum(self.reach, np.asarray(footprint, np.float64))
+        return np.minimum(self.strength * occlusion(self.distance, points, reach), 1.0)
+
+    def _color_pair(self) -> tuple[np.ndarray, np.ndarray]:
+        return premultiplied(self.clean), premultiplied(self.dirt)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Thickness(_OnShape):
+    """One colour where the shape is thin, another where it is thick: by `thickness`."""
+
+    thin_length: Number = field(
+        default=0.02, metadata=means("length", "at which the colour is that of thin parts")
+    )
+    thick_length: Number = field(
+        default=0.3, metadata=means("length", "at which it is that of thick parts")
+    )
+    thin: Color = field(default="#e8734a", metadata=means("color", "of thin parts"))
+    thick: Color = field(default="#4a2a22", metadata=means("color", "of thick parts"))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.thick_length <= self.thin_length:
+            raise TextureError(
+                f"thick_length is {self.thick_length:g}, thin_length {self.thin_length:g}",
+                "Thickness(thick_length=...)",
+                "pass a thick_length that is larger",
+            )
+
+    def weight(self, points: Points, footprint: Number | Values = 0.0) -> Values:
+        """Return 0 in thin parts, 1 in thick ones, (n,)."""
+        length = thickness(self.distance, points, largest=self.thick_length)
+        return smoothstep(self.thin_length, self.thick_length, length)
+
+    def _color_pair(self) -> tuple[np.ndarray, np.ndarray]:
+        return premultiplied(self.thin), premultiplied(self.thick)
+
+
+def mean_curvature(
+    distance: SignedDistance, points: Points, step: Number | Values = 1e-3
+) -> Values:
+    """Return half the divergence of the unit gradient: 1/r on a sphere of radius r.
+
+    Parameters
+    ----------
+    distance : callable
+        Any function with the shape as its zero set; (n, 3) points to (n,) values.
+    points : (n, 3) float64
+        World units; off the surface it is that of the level set through the point.
+    step : float or (n,) float64
+        To the places around that are asked, world units; details smaller than it are not seen.
+
+    Notes
+    -----
+    Method: ``(|g|^2 tr H - g . H g) / (2 |g|^3)``, g and H the gradient and the second derivatives
+    by central differences, 19 values a point. 0 where the gradient vanishes.
+    Accuracy: the error falls with the square of the step; rounding of the values is divided by it.
+
+    References
+    ----------
+    Goldman, "Curvature formulas for implicit curves and surfaces", 2005,
+    doi:10.1016/j.cagd.2005.06.005.
+
+    Examples
+    --------
+    >>> ball = lambda p: np.linalg.norm(p, axis=1) - 2.0
+    >>> mean_curvature(ball, np.array([[2.0, 0.0, 0.0]])).round(6)
+    array([0.5])
+    """
+    step = np.broadcast_to(np.asarray(step, np.float64), len(points))
+    eye = np.eye(3)
+    pairs = list(combinations(range(3), 2))
+    diagonals = [eye[i] + side * eye[j] for i, j in pairs for side in (1, -1)]
+    offsets = np.concatenate([np.zeros((1, 3)), eye, -eye, diagonals, -np.array(diagonals)])
+    values = _values(distance, (points + offsets[:, None] * step[:, None]).reshape(-1, 3))
+    values = values.reshape(len(offsets), -1)
+    middle, after, before = values[0], values[1:4], values[4:7]
+    gradient = (after - before) / (2 * step)
+    second = (after - 2 * middle + before) / step**2
+    square = (gradient**2).sum(axis=0)
+    bent = (gradient**2 * second).sum(axis=0)
+    ends = values[7:13] + values[13:19]
+    for number, (i, j) in enumerate(pairs):
+        cross = (ends[2 * number] - ends[2 * number + 1]) / (4 * step**2)
+        bent += 2 * gradient[i] * gradient[j] * cross
+    top = square * second.sum(axis=0) - bent
+    flat = square < 1e-12
+    return np.where(flat, 0.0, top / (2 * np.where(flat, 1.0, square) ** 1.5))
+
+
+def occlusion(distance: SignedDistance, points: Points, reach: Number | Values) -> Values:
+    """Return how much of the distance expected along the normal is missing, (n,) in [0, 1].
+
+    At i/5 of the reach from the surface, i = 1 to 5, an open place is as far from the shape as from
+    the point. The shortfalls, as shares, are averaged with weights that halve from tap to tap.
+
+    References
+    ----------
+    Evans, "Fast approximations for global illumination on dynamic scenes", SIGGRAPH 2006 course,
+    doi:10.1145/1185657.1185834.
+
+    Examples
+    --------
+    >>> corner = lambda p: np.minimum(p[:, 0], p[:, 1])
+    >>> occlusion(corner, np.array([[0.0, 9.0, 0.0]]), 1.0)
+    array([0.])
+    """
+    reach = np.broadcast_to(np.asarray(reach, np.float64), len(points))
+    on_surface, normal = _project(distance, points, reach)
+    total = np.zeros(len(points))
+    weights = 0.5 ** np.arange(TAPS)
+    for tap, weight in enumerate(weights / weights.sum(), start=1):
+        height = reach * tap / TAPS
+        found = _values(distance, on_surface + height[:, None] * normal)
+        total += weight * np.clip(1 - found / height, 0, 1)
+    return total
+
+
+def thickness(distance: SignedDistance, points: Points, *, largest: Number) -> Values:
+    """Return the way through the shape along the inward normal, at most ``largest``.
+
+    Parameters
+    ----------
+    distance : callable
+        Its size never exceeds the distance to the surface; (n, 3) points to (n,) values.
+    points : (n, 3) float64
+        World units; on the surface or near it.
+    largest : float
+        World units; ways longer than it are not followed.
+
+    Notes
+    -----
+    Method: sphere tracing (Hart 1996, doi:10.1007/s003710050084) from 1e-4 of ``largest`` below
+    the surface, until the far side is within 1e-9 of it.
+
+    Examples
+    --------
+    >>> ball = lambda p: np.linalg.norm(p, axis=1) - 2.0
+    >>> thickness(ball, np.array([[2.0, 0.0, 0.0]]), largest=10.0).round(6)
+    array([4.])
+    """
+    largest = float(largest)
+    if not (np.isfinite(largest) and largest > 0):
+        raise TextureError(
+            f"largest is {largest}", "thickness(largest=...)", "pass a length above 0"
+        )
+    on_surface, normal = _project(distance, points, np.full(len(points), 1e-3 * largest))
+    way = np.full(len(points), 1e-4 * largest)
+    active = np.arange(len(points))
+    for _ in range(MOST_STEPS):
+        inside = -_values(distance, on_surface[active] - way[active, None] * normal[active])
+        way[active] += np.maximum(inside, 0)
+        active = active[(inside > CLOSE * largest) & (way[active] < largest)]
+        if not len(active):
+            break
+    return np.minimum(way, largest)
+
+
+def _project(distance: SignedDistance, points: Points, reach: Values) -> tuple[Points, Points]:
+    """The points moved onto the surface along the normal, and the unit normals there."""
+    step = 1e-3 * reach
+    offsets = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    values = _values(distance, (points + offsets[:, None] * step[:, None]).reshape(-1, 3))
+    values = values.reshape(7, -1)
+    gradient = ((values[1:4] - values[4:7]) / (2 * step)).T
+    length = np.sqrt((gradient**2).sum(axis=1))
+    normal = gradient / np.where(length == 0, 1.0, length)[:, None]
+    return points - values[0][:, None] * normal, normal
+
+
+def _values(distance: SignedDistance, points: Points) -> Values:
+    values = np.asarray(distance(points), np.float64)
+    if values.shape != (len(points),):
+        raise TextureError(
+            f"the signed distance gave an array of shape {values.shape} for {len(points)} points",
+            "distance(points)",
+            "return (n,) values",
+        )
+    return values
