@@ -12,7 +12,7 @@ USUAL_NAMES = ("surface", "distance")
 def convert_volume(console: Console, source: str, out: str, options: dict) -> int:
     """Convert as the options of `convert` say; return the exit code."""
     from ..io import check_input, check_volume_output, probe_volume, read_volume, stored_bytes
-    from ..io.losses import file_losses, require_accepted, volume_losses
+    from ..io.losses import file_losses, metadata_losses, require_accepted, volume_losses
     from ..io.registry import format_of
 
     force, name = options["force"], options["grid"]
@@ -28,11 +28,14 @@ def convert_volume(console: Console, source: str, out: str, options: dict) -> in
     is_dense = _is_dense(volume, target, options, grid_class)
     losses += volume_losses(volume, target, is_dense=is_dense, half=options["half"])
     require_accepted(losses, out, force=force, warn=console.warn)
+    notes = metadata_losses(told, name, target)
+    require_accepted(notes, out, force=True, warn=console.warn)
     with console.stage("convert"):
         volume = _formed(console, volume, options, is_dense=is_dense)
         volume = _without_lost(volume, target.holds)
     facts = volume.facts()
     writer = options["writer"] | _naming(console, target, name, grid_class, is_dense=is_dense)
+    writer |= _carried(source, told, name, target)
     with console.stage("write"):
         _write(console, out, volume, options, writer)
     n_bytes = stored_bytes(out)
@@ -42,7 +45,7 @@ def convert_volume(console: Console, source: str, out: str, options: dict) -> in
     console.json(
         {"input": source, "output": out, "bytes": n_bytes}
         | facts
-        | {"sign_reason": "as the input tells it", "losses": losses}
+        | {"sign_reason": "as the input tells it", "losses": losses + notes}
         | {"seconds": seconds, "warnings": console.warnings}
     )
     return YES
@@ -137,6 +140,15 @@ def _naming(console: Console, target, name: str | None, grid_class: str, *, is_d
     if is_fog:
         console.warn("these are densities of a fog volume, which is not told in the output")
     return options
+
+
+def _carried(source: str, told: dict, name: str | None, target) -> dict:
+    """What the writer is given of a file's metadata."""
+    if "grids" not in told or "metadata" not in target.holds:
+        return {}
+    from ..io import read_vdb_metadata
+
+    return {"metadata": read_vdb_metadata(source, grid=name)}
 
 
 def _write(console: Console, out: str, volume, options: dict, writer: dict) -> None:

@@ -81,6 +81,8 @@ def _fact_lines(facts: dict, indent: str) -> list[str]:
             for item in value:
                 first, *others = _fact_lines(item, indent + "    ")
                 lines += [f"{indent}  - {first.strip()}", *others]
+        elif isinstance(value, dict):
+            lines += [words, *(f"{indent}  {name}: {_plain(each)}" for name, each in value.items())]
         else:
             lines.append(f"{words} {_plain(value)}")
     return lines

@@ -22,9 +22,11 @@ _HOMES = {
     "read_zarr": "zarr_volume",
     "read_mesh": "meshes",
     "VdbGrid": "vdb_grid",
+    "VdbMetadata": "vdb_foreign",
     "probe_vdb": "vdb",
     "read_vdb": "vdb",
     "read_vdb_grids": "vdb",
+    "read_vdb_metadata": "vdb",
     "read_volume": "volumes",
     "stored_bytes": "registry",
     "suffixes": "registry",
@@ -40,6 +42,7 @@ _HOMES = {
 
 __all__ = [
     "VdbGrid",
+    "VdbMetadata",
     "atomic_write",
     "check_exr_output",
     "check_input",
@@ -56,6 +59,7 @@ __all__ = [
     "read_mesh",
     "read_vdb",
     "read_vdb_grids",
+    "read_vdb_metadata",
     "read_volume",
     "read_zarr",
     "stored_bytes",

@@ -42,6 +42,39 @@ def data_name(header: Path, suffix: str) -> Path:
     return path
 
 
+def check_words(place: Path, format: str, suffix: str, *, force: bool) -> None:
+    """Refuse to replace the JSON file of something else, which happens to have the same stem.
+
+    Parameters
+    ----------
+    place : Path
+        The JSON file beside a volume.
+    format : str
+        What our own say they are, "NAME/VERSION".
+    suffix : str
+        Of the volume.
+    force : bool
+        Whether our own may be replaced.
+
+    Raises
+    ------
+    IoError
+        As `check_output`; or it holds something else, even with ``force``.
+    """
+    check_output(place, force)
+    if place.exists() and format.split("/")[0].encode() not in _start_of(place):
+        what = f"this JSON file does not belong to the {suffix} volume, and would be replaced"
+        raise IoError(what, f"output {place}", "move it away, or choose another name")
+
+
+def _start_of(path: Path) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            return file.read(100)
+    except OSError as error:
+        raise IoError(f"cannot read: {error.strerror}", f"output {path}", "move it") from error
+
+
 @contextmanager
 def written_together(
     header: str | os.PathLike, data: str | os.PathLike, force: bool

@@ -3,7 +3,8 @@
 Pixels are one channel ``Y``, float32 or float16, packed with ZIP, which every program reads.
 `exr_layout` says where a node lies, `exr_facts` what the header and the JSON beside it tell. The
 package OpenEXR writes; what it wrote is read by `exr_header` and `exr_pixels`, because a damaged
-file must not reach a library in C++.
+file must not reach a library in C++. Packings of other programs that are unpacked by it all the
+same, such as PIZ, are so in a process of their own: `exr_process`.
 """
 
 import errno
@@ -17,20 +18,19 @@ import numpy as np
 from ..arrays import Number
 from ..errors import IoError
 from ..grid import Grid, NarrowBand
-from .atomic import check_output
 from .dense_form import dense_form
-from .detached import written_together
+from .detached import check_words, written_together
 from .exr_facts import FORMAT, PREFIX, ExrFacts, LayoutName, parse_facts
 from .exr_header import Part, read_parts
 from .exr_layout import Slicing, Up, nearly_square
 from .exr_pixels import read_images
+from .exr_process import LOSSY
 from .half import check_half
 from .opened import opened_reader
 from .vdb_stream import VdbReader
 from .volume_checks import check_volume
 from .warn import Warn, ignore
 
-_FAMILY = FORMAT.split("/")[0].encode()
 _LONGEST_SIDE = (1 << 31) - 1  # the corners of an image are 32-bit numbers
 
 
@@ -113,15 +113,21 @@ def check_exr_output(path: str | os.PathLike, *, force: bool = False) -> Path:
         As `check_output`, of that file; or it holds something else, even with ``force``.
     """
     place = Path(path).with_suffix(".json")
-    check_output(place, force)
-    if place.exists() and _FAMILY not in _start_of(place):
-        what = "this JSON file does not belong to an .exr volume, and would be replaced"
-        raise IoError(what, f"output {place}", "move it away, or choose another name")
+    check_words(place, FORMAT, ".exr", force=force)
     return place
 
 
 def read_exr(path: str | os.PathLike, *, warn: Warn = ignore) -> Grid:
     """Read a grid that `write_exr` wrote; the JSON beside it is not needed.
+
+    Another program may have saved it again, in any packing that was known before OpenEXR 3.4.
+
+    Parameters
+    ----------
+    path : path
+        The ``.exr`` file.
+    warn : callable
+        Told if its packing changes values.
 
     Raises
     ------
@@ -131,6 +137,9 @@ def read_exr(path: str | os.PathLike, *, warn: Warn = ignore) -> Grid:
     """
     with opened_reader(path) as reader:
         parts, is_multi, facts = _headers(reader)
+        lossy = {p.compression for p in parts if p.dtype.name in LOSSY.get(p.compression, ())}
+        if lossy:
+            warn(f"its pixels are packed with {', '.join(sorted(lossy))}, which changes values")
         images = read_images(reader, parts, is_multi)
         values = np.empty(facts.slicing.shape, np.float32)
         slices = facts.slicing.slices_of(values)
@@ -259,11 +268,3 @@ def _headers(reader: VdbReader) -> tuple[list[Part], bool, ExrFacts]:
         if part.shape != shape or part.dtype.name != facts.dtype:
             raise ValueError(f"it has {part.dtype.name} pixels {part.shape}, not {shape}")
     return parts, is_multi, facts
-
-
-def _start_of(path: Path) -> bytes:
-    try:
-        with open(path, "rb") as file:
-            return file.read(100)
-    except OSError as error:
-        raise IoError(f"cannot read: {error.strerror}", f"output {path}", "move it") from error

@@ -2,7 +2,7 @@
 
 A file is: magic number; version and flags; for every part a list of attributes (name, type, size,
 bytes) that ends with an empty name, and an empty list if it is a multi-part file; for every part a
-table with the place of each chunk; the chunks. A chunk holds 1 or 16 lines.
+table with the place of each chunk; the chunks. A chunk holds 1 to 256 lines.
 (OpenEXR file layout, openexr.com/en/latest/OpenEXRFileLayout.html.)
 """
 
@@ -18,7 +18,18 @@ TILED, LONG_NAMES, DEEP, MULTIPART = 0x200, 0x400, 0x800, 0x1000
 """Flags beside the version number, which is 2."""
 
 COMPRESSIONS = ("NONE", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB")
-LINES_OF_CHUNK = {"NONE": 1, "ZIPS": 1, "ZIP": 16}
+LINES_OF_CHUNK = {
+    "NONE": 1,
+    "RLE": 1,
+    "ZIPS": 1,
+    "ZIP": 16,
+    "PIZ": 32,
+    "PXR24": 16,
+    "B44": 32,
+    "B44A": 32,
+    "DWAA": 32,
+    "DWAB": 256,
+}
 """Those that are read, with the lines of a chunk."""
 
 PIXEL_TYPES = {1: np.dtype("<f2"), 2: np.dtype("<f4")}
@@ -44,12 +55,15 @@ class Part:
         Of a pixel.
     compression : str
         A key of `LINES_OF_CHUNK`.
+    channels : bytes
+        The list of channels as it stands there, with the one that is known.
     """
 
     texts: dict[str, str]
     shape: tuple[int, int]
     dtype: np.dtype
     compression: str
+    channels: bytes
 
     @property
     def lines(self) -> int:
@@ -146,7 +160,8 @@ def _part(attributes: dict[str, tuple[str, bytes]]) -> Part:
     width, height = (window[2:] - window[:2] + 1).tolist()
     if window[:2].any() or width < 1 or height < 1:
         raise ValueError(f"its data window is {window.tolist()}")
-    part = Part(texts, (height, width), _pixel_type(attributes), name)
+    dtype = _pixel_type(attributes)
+    part = Part(texts, (height, width), dtype, name, attributes["channels"][1])
     if "chunkCount" in attributes:
         told = int.from_bytes(_value(attributes, "chunkCount", "int", 4), "little", signed=True)
         if told != part.n_chunks:

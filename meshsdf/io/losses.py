@@ -1,7 +1,7 @@
 """What a volume would lose in another form or format, told before it is converted.
 
 A loss is one sentence. Losses of data are refused unless they are accepted; other things, such as
-the name of a grid, are only told.
+the name of a grid or notes of other programs, are only told.
 """
 
 import os
@@ -16,6 +16,7 @@ from .warn import Warn
 
 FIX = "--force (force=True) accepts the loss; .npz and .zarr hold all that a volume has"
 
+_MOST_NAMES = 20  # in one sentence
 _ASKED = {"closest": "closest faces and barycentrics", "half": "16-bit floats"}
 
 
@@ -111,6 +112,36 @@ def file_losses(facts: Mapping, chosen: str | None, *, is_named: bool) -> list[s
         sentences.append(
             f"one grid is converted, so {listed} would be left out; choose with --grid"
         )
+    return sentences
+
+
+def metadata_losses(facts: Mapping, chosen: str | None, format: Format) -> list[str]:
+    """Return a sentence for the metadata of a ``.vdb`` file that a format has no place for.
+
+    Parameters
+    ----------
+    facts : mapping
+        What `probe_volume` says of the file.
+    chosen : str or None
+        The grid that is read; None for the one that is meant.
+    format : Format
+        Where it goes.
+
+    Notes
+    -----
+    These are notes of other programs, so they are told, and not refused.
+    """
+    if "metadata" in format.holds or "grids" not in facts:
+        return []
+    chosen = facts.get("default_grid") if chosen is None else chosen
+    grid = next((grid for grid in facts["grids"] if grid["name"] == chosen), {})
+    sentences = []
+    for owner, entries in ((f"grid {chosen!r}", grid), ("file", facts)):
+        names = [f"'{name}'" for name in entries.get("metadata", {})]
+        if names:
+            more = [f"{len(names) - _MOST_NAMES} more"] if len(names) > _MOST_NAMES else []
+            listed = ", ".join(names[:_MOST_NAMES] + more)
+            sentences.append(f"{format.name} has no place for the metadata {listed} of the {owner}")
     return sentences
 
 

@@ -81,23 +81,12 @@ def write_raw(
     if half:
         check_half(values, f"output {path}")
         values = halved(values)
-    facts = {
-        "format": FORMAT,
-        "shape": list(values.shape),
-        "dtype": values.dtype.name,
-        "byte_order": "little",
-        "order": "x_fastest",
-        "origin": grid.origin.tolist(),
-        "voxel_size": float(grid.voxel_size),
-    }
-    for key, text in told_of(grid).items():
-        name = key.removeprefix(PREFIX)
-        facts[name] = text if name == "sign" else json.loads(text)
+    facts = described(grid, values.shape, values.dtype, FORMAT)
     header = data_name(path, ".json")
     with written_together(header, path, force) as (head, body):
         with open(body, "wb") as file:
             write_values(file, values, values.dtype.newbyteorder("<"))
-        head.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8", newline="\n")
+        head.write_text(facts, encoding="utf-8", newline="\n")
 
 
 def read_raw(path: str | os.PathLike, *, warn: Warn = ignore) -> Grid:
@@ -133,6 +122,23 @@ def probe_raw(path: str | os.PathLike) -> dict:
     return header.facts() | {"order": "x_fastest" if is_x_fastest else "z_fastest"}
 
 
+def described(grid: Grid, shape: tuple[int, ...], dtype: np.dtype, format: str) -> str:
+    """Return the JSON that tells what values of this shape and type, x fastest, are."""
+    facts = {
+        "format": format,
+        "shape": list(shape),
+        "dtype": dtype.name,
+        "byte_order": "little",
+        "order": "x_fastest",
+        "origin": grid.origin.tolist(),
+        "voxel_size": float(grid.voxel_size),
+    }
+    for key, text in told_of(grid).items():
+        name = key.removeprefix(PREFIX)
+        facts[name] = text if name == "sign" else json.loads(text)
+    return json.dumps(facts, indent=2) + "\n"
+
+
 def _read_z_fastest(read, shape: tuple[int, int, int], stored: np.dtype) -> np.ndarray:
     flat = np.frombuffer(read(int(np.prod(shape)) * stored.itemsize), stored)
     return flat.reshape(shape).astype(memory_type(stored))
@@ -149,12 +155,13 @@ def _read_header(path: str | os.PathLike) -> tuple[DenseHeader, bool]:
         what = f"there is no {beside.name} that tells what is in {path.name}"
         raise IoError(what, f"file {path}", fix)
     with opened(beside) as (file, _):
-        header, is_x_fastest = _understood(_json(file))
+        header, is_x_fastest = understood(read_words(file), FORMAT)
         header.facts()  # what is wrong with these is wrong with the JSON
     return header, is_x_fastest
 
 
-def _json(file: BinaryIO) -> dict:
+def read_words(file: BinaryIO) -> dict:
+    """Return the JSON object in a file; ValueError if there is none."""
     data = file.read(_LONGEST_JSON + 1)
     if len(data) > _LONGEST_JSON:
         raise ValueError(f"it is longer than {_LONGEST_JSON} bytes")
@@ -164,9 +171,10 @@ def _json(file: BinaryIO) -> dict:
     return found
 
 
-def _understood(facts: dict) -> tuple[DenseHeader, bool]:
-    if facts.get("format") != FORMAT:
-        raise ValueError(f"its format is {_shown(facts.get('format'))}, not {FORMAT!r}")
+def understood(facts: dict, format: str) -> tuple[DenseHeader, bool]:
+    """Return what `described` tells, and whether x is fastest; ValueError if it makes no sense."""
+    if facts.get("format") != format:
+        raise ValueError(f"its format is {_shown(facts.get('format'))}, not {format!r}")
     shape = facts.get("shape")
     if not (isinstance(shape, list) and len(shape) == 3 and all(type(n) is int for n in shape)):
         raise ValueError(f"its shape is {_shown(shape)}, not three whole numbers")
@@ -191,7 +199,8 @@ def _understood(facts: dict) -> tuple[DenseHeader, bool]:
     }
     size = one_spacing([float(facts["voxel_size"])])
     place = np.array([float(x) for x in origin])
-    return DenseHeader("raw", stored, tuple(shape), size, place, told), order == "x_fastest"
+    name = format.split(".")[1].split("/")[0]
+    return DenseHeader(name, stored, tuple(shape), size, place, told), order == "x_fastest"
 
 
 def _is_number(value: object) -> bool:

@@ -52,6 +52,7 @@ class Format:
     - ``closest``: closest faces and barycentrics; ``hermite``: crossings, normals and features;
       ``uncertain``: which nodes of a band have no certain side
     - ``vectors``: three numbers a node, by functions of the format's own module
+    - ``metadata``: what a ``.vdb`` file says beyond its volume, whoever put it there
     """
 
     name: str
@@ -74,6 +75,7 @@ class Format:
 _SPELLED = frozenset({"grid", "transform"})
 _UNPLACED = frozenset({"grid", "gaps"})
 _PLACED = _UNPLACED | {"double", "transform", "sign", "half_width"}
+_IMAGES = (_PLACED | {"half"}) - {"double"}
 _SPARSE = frozenset({"band", "grid", "half", "gaps", "transform", "sign", "half_width"})
 _SPARSE |= {"closest", "uncertain"}
 
@@ -94,14 +96,15 @@ FORMATS = (
     Format("GLB", (".glb",), "mesh", "gltf", "read_gltf", "write_glb"),
     Format("glTF", (".gltf",), "mesh", "gltf", "read_gltf"),
     _volume("NPZ volume", (".npz",), "npz", _SPARSE | {"double", "hermite"}),
-    _volume("OpenVDB", (".vdb",), "vdb", _SPARSE | {"vectors"}, has_names=True),
+    _volume("OpenVDB", (".vdb",), "vdb", _SPARSE | {"vectors", "metadata"}, has_names=True),
     _volume("NRRD", (".nrrd", ".nhdr"), "nrrd", _PLACED, has_warnings=True),
     _volume("MetaImage", (".mha", ".mhd"), "metaimage", _PLACED, has_warnings=True),
     _volume("VTK ImageData", (".vti",), "vti", _PLACED, has_names=True, has_warnings=True),
     _volume("raw with JSON", (".raw",), "raw", _PLACED | {"half"}, has_warnings=True),
     _volume("Unity volume", (".vf",), "vf", _UNPLACED | {"vectors"}, has_warnings=True),
+    _volume("DDS texture", (".dds",), "dds", _IMAGES, has_warnings=True),
     _volume("SDFGen grid", (".sdf",), "sdfgen", _SPELLED, has_warnings=True),
-    _volume("OpenEXR", (".exr",), "exr", (_PLACED | {"half"}) - {"double"}, has_warnings=True),
+    _volume("OpenEXR", (".exr",), "exr", _IMAGES, has_warnings=True),
     Format(
         *("Zarr", (".zarr",), "volume", "zarr_volume", "read_zarr", "write_zarr", "probe_zarr"),
         marker="zarr.json",

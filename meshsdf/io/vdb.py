@@ -32,6 +32,7 @@ from .vdb_archive import read_grid, read_headers, write_archive
 from .vdb_band import band_to_grids, grid_to_band, with_companions
 from .vdb_choice import file_facts, is_band, named_grid, omitted, owner_of, volume_grid
 from .vdb_dense import GridClass, dense_to_grid, grid_to_dense
+from .vdb_foreign import CREATOR, VdbMetadata, foreign_entries
 from .vdb_grid import VdbGrid, check_grid
 from .vdb_metadata import Metadata, check_metadata
 from .vdb_values import ACTIVE_MASK, BLOSC, ZIP
@@ -52,6 +53,7 @@ def write_vdb(
     compression: Compression = "active",
     name: str | None = None,
     grid_class: GridClass = "level set",
+    metadata: VdbMetadata | None = None,
 ) -> None:
     """Write a band or a full grid as the grid that other programs expect.
 
@@ -76,6 +78,8 @@ def write_vdb(
         Of the grid; "surface" if not given, "density" for fog.
     grid_class : "level set" or "fog volume"
         What a full grid is; a band is always a level set.
+    metadata : VdbMetadata
+        What the file and the grid say besides, as `read_vdb_metadata` gives it.
 
     Raises
     ------
@@ -84,6 +88,7 @@ def write_vdb(
         said in this format.
     """
     where = f"output {path}"
+    beyond = metadata or VdbMetadata()
     check_output(path, force)
     try:
         check_volume(volume)
@@ -100,7 +105,9 @@ def write_vdb(
             grids = [dense_to_grid(volume, name, grid_class, is_half=half)]
     except ValueError as error:
         raise _unwritable(error, where) from error
-    write_vdb_grids(path, grids, force=force, compression=compression)
+    grids[0] = replace(grids[0], metadata=beyond.grid | grids[0].metadata)
+    options = {"force": force, "compression": compression, "metadata": beyond.file}
+    write_vdb_grids(path, grids, **options)
 
 
 def write_vdb_grids(
@@ -156,7 +163,7 @@ def write_vdb_grids(
     check_output(path, force)
     if compression == "blosc":
         require_blosc(where)
-    metadata = {"creator": "meshsdf"} | (metadata or {})
+    metadata = {"creator": CREATOR} | (metadata or {})
     try:
         check_metadata(metadata)
         for grid in grids:
@@ -215,6 +222,25 @@ def read_vdb(
     return volume
 
 
+def read_vdb_metadata(path: str | os.PathLike, *, grid: str | None = None) -> VdbMetadata:
+    """Return what a file says beyond the volume that `read_vdb` reads; IoError as there.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from meshsdf import mesh_to_band
+    >>> from meshsdf.mesh.primitives import box_mesh
+    >>> path = tempfile.mkdtemp() + "/box.vdb"
+    >>> words = VdbMetadata(file={"shot": "a10"}, grid={"frame": 7})
+    >>> write_vdb(path, mesh_to_band(box_mesh(), voxel_size=0.1), metadata=words)
+    >>> read_vdb_metadata(path)
+    VdbMetadata(file={'shot': 'a10'}, grid={'frame': 7})
+    """
+    with opened_reader(path) as reader:
+        header = read_headers(reader)
+        return foreign_entries(header, volume_grid(header, grid, f"file {path}"))
+
+
 def read_vdb_grids(
     path: str | os.PathLike, names: Sequence[str] | None = None, *, warn: Warn = ignore
 ) -> list[VdbGrid]:
@@ -265,7 +291,8 @@ def probe_vdb(path: str | os.PathLike) -> dict:
     ``kind`` is "vdb"; ``grids`` lists every grid with ``name``, ``type``, ``class``,
     ``voxel_size``, ``translation``, ``background``, ``dtype``, ``compression``, and where the file
     tells them ``active_voxels``, ``first_node`` and ``last_node``; ``problem`` says why a grid
-    cannot be read. ``default_grid`` is the one that `read_vdb` takes.
+    cannot be read. ``default_grid`` is the one that `read_vdb` takes. ``metadata``, of the file and
+    of a grid, is what stands there besides, if anything does.
     """
     with opened_reader(path) as reader:
         return file_facts(read_headers(reader))

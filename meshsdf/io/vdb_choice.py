@@ -8,6 +8,8 @@ from ..errors import IoError
 from .vdb_archive import FileHeader, GridHeader
 from .vdb_band import HALF_WIDTH, OF
 from .vdb_dense import SHAPE
+from .vdb_foreign import file_entries, grid_entries
+from .vdb_metadata import Bytes, Metadata
 from .vdb_stream import printable
 from .vdb_transform import uniform_scale
 from .vdb_values import compression_words
@@ -85,6 +87,7 @@ def file_facts(header: FileHeader) -> dict:
         "default_grid": default,
         "grids": [_grid_facts(grid) for grid in header.grids],
     }
+    facts |= _beyond(file_entries(header))
     return facts | ({"lost": header.lost} if header.lost else {})
 
 
@@ -117,14 +120,24 @@ def _grid_facts(grid: GridHeader) -> dict:
         if entry in grid.metadata:
             value = grid.metadata[entry]
             facts[key] = _plain(value)
-    return facts
+    return facts | _beyond(grid_entries(grid))
+
+
+def _beyond(entries: Metadata) -> dict:
+    """What stands in a file besides, as it may be shown."""
+    shown = {printable(name): _plain(value) for name, value in entries.items()}
+    return {"metadata": shown} if shown else {}
 
 
 def _plain(value):
     """A value of metadata as it may be shown."""
     if isinstance(value, str):
         return printable(value)
-    return list(value) if isinstance(value, tuple) else value
+    if isinstance(value, Bytes):
+        return f"{len(value.data)} bytes of type {printable(value.kind)}"
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return value if math.isfinite(value) else str(value)
 
 
 def _candidates(header: FileHeader) -> list[GridHeader]:

@@ -104,6 +104,10 @@ def check_volume_output(path: str | os.PathLike, *, force: bool = False) -> None
         from .exr import check_exr_output
 
         check_exr_output(path, force=force)
+    elif suffix == ".dds":
+        from .dds import check_dds_output
+
+        check_dds_output(path, force=force)
     elif suffix in _BESIDE:
         check_output(Path(path).with_suffix(_BESIDE[suffix]), force)
 

@@ -12,6 +12,7 @@ from ..arrays import BrickCoordinates, BrickValues, Ijk1
 from ..grid import NarrowBand
 from ..grid.brick_index import BRICK, INSIDE
 from .half import halved
+from .run_packer import RunPacker
 from .vdb_stream import UnsuitedError
 from .zarr_array import (
     MOST_CHUNKS,
@@ -29,6 +30,8 @@ CHUNK = 64
 """Nodes along a side of a chunk: 1 MiB of float32."""
 
 AXES = ("z", "y", "x")
+
+_N_SAMPLES = 8  # chunks from which the others' code is made
 
 
 def brick_box(coordinates: BrickCoordinates) -> tuple[Ijk1, Ijk1]:
@@ -71,24 +74,40 @@ def write_band_values(folder: Path, band: NarrowBand, dtype: np.dtype) -> None:
     spec = ArraySpec(tuple(shape[::-1].tolist()), (CHUNK,) * 3, dtype, float(background))
     write_metadata(folder, spec, AXES)
     groups = _BricksOfChunks(band.index.coordinates, spec)
-    all_inside = pack(np.full(spec.chunk, -background))
     corners = np.indices((CHUNK // BRICK,) * 3).reshape(3, -1).T
 
-    def write(at: tuple[int, ...]) -> None:
+    def chunk_at(at: tuple[int, ...]) -> np.ndarray | None:
+        """The values [k, j, i] of a chunk; None if all of it is outside."""
         slots = groups.slots(at)
         start = first // BRICK + np.array(at[::-1]) * (CHUNK // BRICK)
         is_inside = band.index.lookup(start + corners) == INSIDE
-        if len(slots) == 0 and is_inside.all():
-            store(folder, spec, at, all_inside)
-        elif len(slots) or is_inside.any():
-            blocks = np.where(is_inside, -background, background).astype(dtype)
-            chunk = _blown_up(blocks.reshape((CHUNK // BRICK,) * 3))
-            values = band.values[slots]
-            local = band.index.coordinates[slots] - start
-            _bricks_in(chunk)[tuple(local.T)] = halved(values) if dtype.itemsize == 2 else values
-            store(folder, spec, at, pack(chunk.transpose(2, 1, 0)))
+        if len(slots) == 0 and not is_inside.any():
+            return None
+        chunk = np.empty(spec.chunk, dtype)
+        bricks = _bricks_in(chunk)
+        blocks = np.where(is_inside, -background, background)
+        bricks[...] = blocks.reshape(bricks.shape[:3]).T[..., None, None, None]
+        values = band.values[slots].transpose(0, 3, 2, 1)
+        local = band.index.coordinates[slots] - start
+        bricks[tuple(local.T[::-1])] = halved(values) if dtype.itemsize == 2 else values
+        return chunk
+
+    packer = RunPacker(chunk_at(at) for at in groups.some())
+    all_inside = packer.pack(np.full(spec.chunk, -background, dtype))
+
+    def write(at: tuple[int, ...]) -> None:
+        chunk = chunk_at(at)
+        if chunk is not None:
+            is_same = len(groups.slots(at)) == 0 and chunk.min() == chunk.max()
+            store(folder, spec, at, all_inside if is_same else _packed(packer, chunk))
 
     for_all_chunks(spec, write)
+
+
+def _packed(packer: RunPacker, chunk: np.ndarray) -> bytes:
+    """The frame of a chunk; numbers unlike all samples are packed with a code of their own."""
+    packed = packer.pack(chunk)
+    return packed if len(packed) <= chunk.nbytes else pack(chunk)
 
 
 def read_band_values(folder: Path, spec: ArraySpec, coordinates: BrickCoordinates) -> BrickValues:
@@ -138,21 +157,21 @@ class _BricksOfChunks:
         self._order = np.argsort(numbers, kind="stable")
         self._ends = np.searchsorted(numbers[self._order], np.arange(n + 1))
 
+    def some(self) -> list[tuple[int, ...]]:
+        """The numbers (z, y, x) of a few chunks that hold bricks, evenly chosen."""
+        full = np.flatnonzero(np.diff(self._ends))
+        chosen = full[np.linspace(0, len(full) - 1, min(len(full), _N_SAMPLES)).astype(int)]
+        places = np.stack(np.unravel_index(chosen, self._n_chunks), axis=1)
+        return [tuple(place[::-1]) for place in places.tolist()]
+
     def slots(self, at: tuple[int, ...]) -> np.ndarray:
         """The slots of the bricks in chunk (z, y, x)."""
         number = int(np.ravel_multi_index(at[::-1], self._n_chunks))
         return self._order[self._ends[number] : self._ends[number + 1]]
 
 
-def _blown_up(blocks: np.ndarray) -> np.ndarray:
-    """An array [i, j, k] of nodes, all those of a brick with its value."""
-    for axis in range(3):
-        blocks = np.repeat(blocks, BRICK, axis)
-    return blocks
-
-
 def _bricks_in(chunk: np.ndarray) -> np.ndarray:
-    """A view (x, y, z, 8, 8, 8) of the bricks in an array [i, j, k] of nodes."""
+    """A view (a, b, c, 8, 8, 8) of the bricks in an array of nodes, in the order of its axes."""
     x, y, z = (n // BRICK for n in chunk.shape)
     nodes = chunk.reshape(x, BRICK, y, BRICK, z, BRICK)
     return nodes.transpose(0, 2, 4, 1, 3, 5)

@@ -15,7 +15,7 @@ from meshsdf.surface import sample_hermite
 from .examples import ball
 
 SPARSE = ("npz", "vdb", "zarr")
-WORDY = ("npz", "vdb", "zarr", "nrrd", "nhdr", "mha", "mhd", "vti", "raw", "exr")
+WORDY = ("npz", "vdb", "zarr", "nrrd", "nhdr", "mha", "mhd", "vti", "raw", "exr", "dds")
 BARE = ("sdf", "vf")
 
 
@@ -189,8 +189,8 @@ def test_doubles_are_rounded_only_if_that_is_accepted(cli, tmp_path):
         out = tmp_path / f"whole_{suffix}.{suffix}"
         assert cli("convert", tmp_path / "a.nrrd", out).code == 0
         assert_same(read_volume(out), grid)
-    for suffix, holder in (("vdb", "OpenVDB"), ("exr", "OpenEXR")):
-        out = tmp_path / f"a.{suffix}"
+    for suffix, holder in (("vdb", "OpenVDB"), ("exr", "OpenEXR"), ("dds", "DDS texture")):
+        out = tmp_path / f"rounded_{suffix}.{suffix}"
         outcome = cli("convert", tmp_path / "a.nrrd", out)
         assert outcome.code == 3
         assert f"{holder} holds 32-bit floats: the values are rounded" in outcome.err
@@ -200,7 +200,7 @@ def test_doubles_are_rounded_only_if_that_is_accepted(cli, tmp_path):
 
 def test_halves_are_stored_where_there_are_such(cli, tmp_path):
     write_volume(tmp_path / "a.npz", ball_band())
-    for suffix in ("vdb", "zarr", "exr", "raw"):
+    for suffix in ("vdb", "zarr", "exr", "raw", "dds"):
         out = tmp_path / f"half_{suffix}.{suffix}"
         assert cli("convert", tmp_path / "a.npz", out, "--half").code == 0
         whole = tmp_path / f"whole_{suffix}.npz"

@@ -8,7 +8,7 @@ from meshsdf.mesh.measures import is_watertight
 
 from .examples import ball
 
-SUFFIXES = ("nrrd", "nhdr", "mha", "mhd", "vti", "raw", "sdf", "vf")
+SUFFIXES = ("nrrd", "nhdr", "mha", "mhd", "vti", "raw", "dds", "sdf", "vf")
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import erfc
 
 from meshsdf.grid import Grid
+from meshsdf.io.dds import probe_dds, read_dds, write_dds
 from meshsdf.io.metaimage import probe_metaimage, read_metaimage, write_metaimage
 from meshsdf.io.nrrd import probe_nrrd, read_nrrd, write_nrrd
 from meshsdf.io.raw import probe_raw, read_raw, write_raw
@@ -49,12 +50,16 @@ WAYS = {
     "vti": Way(".vti", *_VTI),
     "vti plain": Way(".vti", *_VTI, {"compressed": False}),
     "raw": Way(".raw", write_raw, read_raw, probe_raw, {}, ".json"),
+    "dds": Way(".dds", write_dds, read_dds, probe_dds, {}, ".json"),
     "vf": Way(".vf", write_vf, read_vf, probe_vf),
     "sdf": Way(".sdf", write_sdfgen, read_sdfgen, probe_sdfgen),
 }
 
 WORDY = sorted(WAYS.keys() - {"vf", "sdf"})
 """Ways that keep all a grid says."""
+
+DOUBLE = sorted(set(WORDY) - {"dds"})
+"""Ways that keep float64."""
 
 
 def sphere_grid() -> Grid:

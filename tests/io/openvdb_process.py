@@ -2,7 +2,8 @@
 
 Usage: openvdb_process.py make DIR · dump FILE... (writes FILE.npz) · probe FILE... (reads
 FILE.npy, nodes, and writes FILE.npz: the values of the first grid there, and which are active) ·
-quads FILE... (writes FILE.npz: the surface of the first grid as OpenVDB extracts it).
+noted FILE... (reads FILE.json, metadata, and writes FILE) · quads FILE... (writes FILE.npz: the
+surface of the first grid as OpenVDB extracts it).
 """
 
 import json
@@ -136,6 +137,21 @@ def make(folder):
     vdb.write(f"{folder}/empty.vdb", grids=[vdb.FloatGrid(2.0)])
 
 
+def noted(path):
+    """A level set; it and its file say what FILE.json does."""
+    with open(path + ".json") as file:
+        words = json.load(file)
+    for entries in words.values():
+        for name, value in entries.items():
+            entries[name] = tuple(value) if isinstance(value, list) else value
+    sphere = vdb.createLevelSetSphere(1.5, center=(0.3, 0.2, 0.1), voxelSize=0.1)
+    sphere.name = "torso"
+    for name, value in words["grid"].items():
+        sphere[name] = value
+    vdb.write(path, grids=[sphere], metadata=words["file"])
+
+
 if __name__ == "__main__":
+    work = {"make": make, "dump": dump, "probe": probe, "noted": noted, "quads": quads}[sys.argv[1]]
     for name in sys.argv[2:]:
-        {"make": make, "dump": dump, "probe": probe, "quads": quads}[sys.argv[1]](name)
+        work(name)

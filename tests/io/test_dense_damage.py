@@ -20,6 +20,7 @@ FAMILIES = {
     "MetaImage": ("mha", "mhd plain"),
     "VTI": ("vti", "vti plain"),
     "raw": ("raw",),
+    "DDS": ("dds",),
     "vf": ("vf",),
     "SDFGen": ("sdf",),
 }

@@ -1,4 +1,4 @@
-"""What holds for every format of full grids: NRRD, MetaImage, VTI, raw with JSON, .vf, SDFGen."""
+"""What holds for every format of full grids: NRRD, MetaImage, VTI, raw, DDS, .vf, SDFGen."""
 
 import dataclasses
 
@@ -18,7 +18,7 @@ from meshsdf.io.registry import FORMATS, format_of
 from meshsdf.io.volumes import probe_volume
 from meshsdf.mesh.primitives import icosphere
 from meshsdf.surface import sample_hermite
-from tests.io.dense_examples import WAYS, WORDY, assert_same_grid, sphere_grid, written
+from tests.io.dense_examples import DOUBLE, WAYS, WORDY, assert_same_grid, sphere_grid, written
 
 few = settings(max_examples=8, deadline=None)
 seeds = st.integers(0, 2**32 - 1)
@@ -47,7 +47,7 @@ def random_grid(seed, dtype=np.float32) -> Grid:
 @few
 @given(seeds, st.sampled_from([np.float32, np.float64]))
 def test_a_grid_comes_back_bit_equal_with_all_it_says(tmp_path_factory, name, seed, dtype):
-    grid = random_grid(seed, dtype)
+    grid = random_grid(seed, dtype if name in DOUBLE else np.float32)
     path = written(WAYS[name], tmp_path_factory.mktemp("a"), grid)
     assert_same_grid(read_volume(path), grid)
 
@@ -109,7 +109,7 @@ def test_files_that_exist_are_left_alone(tmp_path, way):
 @pytest.mark.parametrize("name", [name for name in WAYS if WAYS[name].beside])
 def test_of_two_files_the_one_that_names_the_other_comes_last(tmp_path, name):
     path = written(WAYS[name], tmp_path, sphere_grid())
-    header = path.with_suffix(".json") if WAYS[name].suffix == ".raw" else path
+    header = path.with_suffix(".json") if WAYS[name].beside == ".json" else path
     (data,) = set(tmp_path.iterdir()) - {header}
     assert data.name in header.read_text() or header.suffix == ".json"
     # Taking its name is the last thing that happens to a file
@@ -161,12 +161,12 @@ def test_numbers_that_a_format_cannot_hold_are_refused_or_told(tmp_path):
         write_volume(tmp_path / "b.vf", wide)
 
 
-def test_only_raw_files_hold_16_bits_and_the_others_say_so(tmp_path):
+def test_raw_files_and_textures_hold_16_bits_and_the_others_say_so(tmp_path):
     grid = sphere_grid()
     for way in WAYS.values():
-        notes, path = [], tmp_path / f"a{way.suffix}"
+        notes, path = [], tmp_path / f"{way.suffix[1:]}{way.suffix}"
         write_volume(path, grid, half=True, force=True, warn=notes.append)
-        if way.suffix == ".raw":
+        if way.suffix in (".raw", ".dds"):
             assert notes == []
             assert probe_volume(path)["dtype"] == "float16"
             rounded = grid.values.astype(np.float16).astype(np.float32)
@@ -181,7 +181,7 @@ def test_only_raw_files_hold_16_bits_and_the_others_say_so(tmp_path):
 
 def test_words_of_a_format_are_those_of_the_registry():
     known = {"band", "grid", "half", "double", "gaps", "transform", "sign", "half_width"}
-    known |= {"closest", "hermite", "uncertain", "vectors"}
+    known |= {"closest", "hermite", "uncertain", "vectors", "metadata"}
     for format in FORMATS:
         assert format.holds <= known
         assert format.kind == "volume" or not format.holds, format.name

@@ -13,7 +13,19 @@ from meshsdf.errors import IoError
 from meshsdf.io.unpacking import LARGEST_RATIO, Inflater
 from tests.io.dense_examples import WAYS, files_of
 
-KEYS = ["nrrd", "nrrd plain", "nhdr", "mha", "mhd plain", "vti", "vti plain", "raw", "vf", "sdf"]
+KEYS = [
+    "nrrd",
+    "nrrd plain",
+    "nhdr",
+    "mha",
+    "mhd plain",
+    "vti",
+    "vti plain",
+    "raw",
+    "dds",
+    "vf",
+    "sdf",
+]
 
 
 def refuse(way, path, data, words):
@@ -39,6 +51,12 @@ def test_counts_of_terabytes_are_refused_without_taking_memory(tmp_path):
         for counts in HUGE:
             if key == "vf":
                 huge = data[:4] + struct.pack("<3H", 65535, 65535, 65535) + data[10:]
+            elif key == "dds":
+                header = path
+                huge = data = path.read_bytes()
+                numbers = [min(int(n), 2**32 - 1) for n in counts.split()]
+                huge = data[:12] + struct.pack("<2I", *numbers[:2]) + data[20:]
+                huge = huge[:24] + struct.pack("<I", numbers[2]) + huge[28:]
             elif key == "raw":
                 numbers = ", ".join(counts.split()).encode()
                 old = data[data.index(b'"shape": [') : data.index(b"]") + 1]

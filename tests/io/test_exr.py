@@ -12,13 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from meshsdf import mesh_to_band, mesh_to_grid, read_mesh, read_volume, write_volume
+from meshsdf import mesh_to_band, read_volume, write_volume
 from meshsdf.errors import IoError
 from meshsdf.grid import Grid
 from meshsdf.io.exr import probe_exr, read_exr, write_exr, write_images
 from meshsdf.io.exr_layout import ALONG, nearly_square
 from meshsdf.mesh.primitives import box_mesh
-from tests.io.examples import model, needs_models
 from tests.io.exr_examples import (
     ball,
     center_of,
@@ -27,7 +26,6 @@ from tests.io.exr_examples import (
     images_of,
     random_grid,
 )
-from tests.io.test_models import COUNTS
 
 few = settings(max_examples=25, deadline=None)
 seeds = st.integers(0, 2**32 - 1)
@@ -275,7 +273,7 @@ def test_neither_file_is_replaced_unless_asked_and_a_strangers_json_never_is(tmp
     write_exr(tmp_path / "a.exr", grid, force=True)
     (tmp_path / "a.json").write_text('{"mine": 1}')
     for force in (False, True):
-        with pytest.raises(IoError, match=r"the output exists|does not belong to an \.exr volume"):
+        with pytest.raises(IoError, match=r"the output exists|does not belong to the \.exr volume"):
             write_exr(tmp_path / "a.exr", grid, force=force)
     assert (tmp_path / "a.json").read_text() == '{"mine": 1}'
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.exr", "a.json"]
@@ -298,27 +296,3 @@ def test_a_picture_is_told_from_a_volume(tmp_path):
         with pytest.raises(IoError, match="this is a picture, not a volume") as error:
             read(tmp_path / "a.exr")
         assert "meshsdf convert MESH OUT.exr" in error.value.fix
-
-
-def test_files_that_other_programs_saved_again_are_read_if_they_are_plain(tmp_path):
-    grid = random_grid(6, (5, 4, 7))
-    write_exr(tmp_path / "a.exr", grid)
-    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
-        header, pixels = dict(file.parts[0].header), np.array(file.parts[0].channels["Y"].pixels)
-    for name in ("NO", "ZIPS", "ZIP", "PIZ", "RLE"):
-        header["compression"] = getattr(OpenEXR, f"{name}_COMPRESSION")
-        OpenEXR.File(header, {"Y": pixels}).write(str(tmp_path / "b.exr"))
-        if name in ("PIZ", "RLE"):
-            with pytest.raises(IoError, match=f"its pixels are packed with {name}"):
-                read_exr(tmp_path / "b.exr")
-        else:
-            assert_same_grid(read_exr(tmp_path / "b.exr"), grid)
-
-
-@needs_models
-@pytest.mark.parametrize("name", COUNTS)
-def test_the_grid_of_every_model_comes_back(tmp_path, name):
-    mesh = read_mesh(model(name))
-    grid = mesh_to_grid(mesh, resolution=32)
-    write_exr(tmp_path / "a.exr", grid, up="y")
-    assert_same_grid(read_exr(tmp_path / "a.exr"), grid)

@@ -14,16 +14,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from meshsdf import mesh_to_band, mesh_to_grid, read_mesh, read_volume, write_volume
+from meshsdf import mesh_to_band, read_volume, write_volume
 from meshsdf.errors import IoError
 from meshsdf.grid import BrickIndex, Grid, NarrowBand
 from meshsdf.io.atomic import atomic_folder, make_folder
 from meshsdf.io.zarr_volume import probe_zarr, read_zarr, write_zarr
 from meshsdf.mesh.primitives import box_mesh
 from meshsdf.surface import sample_hermite
-from tests.io.examples import model, narrow_band, needs_models
+from tests.io.examples import narrow_band
 from tests.io.exr_examples import ball, center_of
-from tests.io.test_models import COUNTS
 from tests.io.zarr_examples import assert_equal, foreign
 
 few = settings(max_examples=8, deadline=None)
@@ -370,12 +369,3 @@ def test_images_that_make_no_grid_are_refused_with_a_reason(tmp_path):
     for options, words in cases:
         with pytest.raises(IoError, match=words):
             read_zarr(foreign(path, **options))
-
-
-@needs_models
-@pytest.mark.parametrize("name", COUNTS)
-def test_the_grid_and_the_band_of_every_model_come_back(tmp_path, name):
-    mesh = read_mesh(model(name))
-    for volume in (mesh_to_grid(mesh, resolution=32), mesh_to_band(mesh, resolution=32)):
-        write_zarr(tmp_path / "a.zarr", volume, force=True)
-        assert_equal(read_zarr(tmp_path / "a.zarr"), volume)
