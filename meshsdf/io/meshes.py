@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import IoError, MeshError
 from ..mesh import Mesh
 from .atomic import atomic_write, check_output
+from .mtl import has_library, write_materials
 from .registry import Format, checked_input, format_of
 from .warn import Warn, ignore
 
@@ -96,15 +97,19 @@ def write_mesh(path: str | os.PathLike, mesh: Mesh, *, force: bool = False) -> N
     -----
     Accuracy: OBJ, OFF and PLY give float64 positions back bit-equal; STL and GLB round to float32,
     as their formats want. Kept besides positions and faces: uv and colours in OBJ, PLY (8-bit
-    colours) and GLB; materials with images in GLB, names of materials in OBJ.
+    colours) and GLB; materials with images in GLB and OBJ, where they
+    are files beside it (``cow.mtl``, ``cow-hide.png``).
     """
     format = format_of(path, "mesh", "writer")
     check_output(path, force)
     if mesh.n_faces == 0:
         raise IoError("the mesh has no faces", f"output {path}", "write a mesh with faces")
     _check_attributes(mesh, f"output {path}")
+    further = ()
+    if format.name == "OBJ" and has_library(mesh):
+        further = (write_materials(Path(path), mesh, force),)
     with atomic_write(path, force) as temporary:
-        format.function(format.writer)(temporary, mesh)
+        format.function(format.writer)(temporary, mesh, *further)
 
 
 def _check_attributes(mesh: Mesh, where: str) -> None:

@@ -3,13 +3,58 @@
 ``Kd`` is linear light, ``d`` the alpha. ``Tr`` is left alone: programs disagree on its direction.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
 
-from ..mesh import Material
-from .images import read_image
+from ..mesh import Material, Mesh
+from .atomic import atomic_write, check_output
+from .images import encode_png, read_image
 from .warn import Warn
+
+
+def material_name(name: str) -> str:
+    """The name by which OBJ and MTL know a material: one line, never empty."""
+    return " ".join(name.split()) or "none"
+
+
+def has_library(mesh: Mesh) -> bool:
+    """Whether a mesh has images, for which an OBJ file needs a material file beside it."""
+    return mesh.uv is not None and any(one.image is not None for one in mesh.materials)
+
+
+def write_materials(path: Path, mesh: Mesh, force: bool) -> str:
+    """Write the material file of an OBJ file, and its images as PNG; return the file's name.
+
+    For ``cow.obj`` these are ``cow.mtl`` and ``cow-hide.png`` for a material "hide".
+
+    Raises
+    ------
+    IoError
+        One of them exists and ``force`` is false, or cannot be written; then none is.
+    """
+    images, lines = {}, []
+    for number, material in enumerate(mesh.materials):
+        name = material_name(material.name)
+        color = " ".join(repr(float(value)) for value in material.base_color[:3])
+        lines += [f"newmtl {name}", f"Kd {color}", f"d {float(material.base_color[3])!r}"]
+        if material.image is not None:
+            plain = re.sub(r"[^\w.-]+", "_", name)
+            file = path.with_name(f"{path.stem}-{plain}.png")
+            if file in images:
+                file = path.with_name(f"{path.stem}-{plain}-{number}.png")
+            images[file] = encode_png(material.image)
+            lines.append(f"map_Kd {file.name}")
+    library = path.with_suffix(".mtl")
+    for file in (library, *images):
+        check_output(file, force)
+    for file, data in images.items():
+        with atomic_write(file, force) as temporary:
+            temporary.write_bytes(data)
+    with atomic_write(library, force) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="replace")
+    return library.name
 
 
 def read_materials(folder: Path, libraries: list[str], warn: Warn) -> dict[str, Material]:

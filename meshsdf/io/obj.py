@@ -16,7 +16,7 @@ import numpy as np
 
 from ..mesh import Material, Mesh
 from ..srgb import linear_rgba, srgb_rgba
-from .mtl import read_materials
+from .mtl import material_name, read_materials
 from .obj_faces import Defined, corner_indices
 from .obj_plain import read_plain_obj
 from .polygons import checked_faces, fan_corners
@@ -69,14 +69,19 @@ def read_obj(path: Path, warn: Warn) -> Mesh:
     )
 
 
-def write_obj(path: Path, mesh: Mesh) -> None:
-    """Write positions and uv so that they read back bit-equal; colours as sRGB text."""
+def write_obj(path: Path, mesh: Mesh, library: str = "") -> None:
+    """Write positions and uv so that they read back bit-equal; colours as sRGB text.
+
+    ``library`` is the name of the material file, if there is one.
+    """
     table, place = [mesh.vertices], "v %r %r %r\n"
     if mesh.vertex_colors is not None:
         table.append(srgb_rgba(mesh.vertex_colors)[:, :3])
         place = "v %r %r %r %r %r %r\n"
     corner = "%d" if mesh.uv is None else "%d/%d"
     with open(path, "w", encoding="utf-8", errors="replace", newline="\n") as file:
+        if library:
+            file.write(f"mtllib {library}\n")
         file.write(_formatted(place, np.hstack(table)))
         if mesh.uv is not None:
             file.write(_formatted("vt %r %r\n", mesh.uv))
@@ -104,7 +109,7 @@ def _material_runs(mesh: Mesh):
         name = mesh.materials[index[first]].name if index[first] >= 0 else ""
         # Faces have no material until the first usemtl; afterwards OBJ cannot take it back.
         is_bare = index[first] < 0 and first == 0
-        runs.append((None if is_bare else " ".join(name.split()) or "none", first, last))
+        runs.append((None if is_bare else material_name(name), first, last))
     return runs
 
 

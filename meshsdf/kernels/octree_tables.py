@@ -39,7 +39,9 @@ class OctreeTables(NamedTuple):
     sheets : (e, 3) float32
         Mean normal of the sheet; zero if it has none.
     neighbors : (e, 27) int32
-        Entry of the brick beside, whose normal is nearest; NO_ENTRY if there is none.
+        Entry of the brick beside, whose normal is nearest; NO_ENTRY if there is none. Where this
+        brick has one sheet and that one several, what the page table says of it (FIRST_GROUP - g):
+        which is meant depends on the side that the point is on.
     parents : (e,) int32
         Entry of the brick a level up; NO_ENTRY at the top.
     texel_first : (e + 1,) int64
@@ -110,11 +112,13 @@ def link_entries(tables, begin, end):
         level = tables.levels[e]
         bx, by, bz = tables.bricks[e, 0], tables.bricks[e, 1], tables.bricks[e, 2]
         nx, ny, nz = sheets[e, 0], sheets[e, 1], sheets[e, 2]
+        single = find_code(heads, pages, level, bx, by, bz) >= 0
         for n in range(27):
             dx, dy, dz = n // 9 - 1, n // 3 % 3 - 1, n % 3 - 1
-            tables.neighbors[e, n] = find_entry(
-                heads, pages, groups, sheets, level, bx + dx, by + dy, bz + dz, nx, ny, nz
-            )
+            code = find_code(heads, pages, level, bx + dx, by + dy, bz + dz)
+            if code <= FIRST_GROUP and not single:
+                code = nearest_sheet(groups, sheets, code, nx, ny, nz)
+            tables.neighbors[e, n] = code
         tables.neighbors[e, SELF] = e
         tables.parents[e] = NO_ENTRY
         if level < top:

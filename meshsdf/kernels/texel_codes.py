@@ -20,6 +20,9 @@ SRGB8, LINEAR8, VALUE8, HALF1, HALF4, NORMAL = range(6)
 LINEAR = linear_from_srgb(np.arange(256) / 255.0).astype(np.float32)
 # Linear values from which on the next code is nearer in sRGB
 STEPS = linear_from_srgb((np.arange(255) + 0.5) / 255.0).astype(np.float32)
+# The codes at the beginnings of equal parts of [0, 1): in none are there more than two steps
+PARTS = np.float32(4096.0)
+FIRST_CODE = np.searchsorted(STEPS, np.arange(4096) / 4096.0, side="right").astype(np.uint8)
 HALF_SCALE = np.ldexp(np.float32(1.0), np.maximum(np.arange(32), 1) - 25).astype(np.float32)
 
 F0, F1 = np.float32(0.0), np.float32(1.0)
@@ -91,14 +94,14 @@ def decode(kind, texel):
 @njit(cache=True, nogil=True)
 def srgb_code(value):
     """The 8-bit sRGB code nearest to a linear value; NaN gives 0."""
-    low, high = 0, 255
-    while low < high:
-        middle = (low + high) >> 1
-        if value >= STEPS[middle]:
-            low = middle + 1
-        else:
-            high = middle
-    return low
+    if not value >= STEPS[0]:
+        return 0
+    if value >= STEPS[254]:
+        return 255
+    code = np.int64(FIRST_CODE[np.int64(value * PARTS)])
+    while value >= STEPS[code]:
+        code += 1
+    return code
 
 
 @njit(cache=True, nogil=True, inline="always")

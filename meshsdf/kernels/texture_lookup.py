@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .octree_tables import SELF, find_code, find_entry, nearest_sheet
+from .octree_tables import FIRST_GROUP, SELF, find_code, find_entry, nearest_sheet
 from .texel_codes import F0, F1, LINEAR, SRGB8, decode
 
 ABSENT = -1  # slot of an entry that is not stored; below that, -2 - tile
@@ -41,9 +41,17 @@ def corner_entry(
     heads, pages, groups, sheets, neighbors, level, base, bx, by, bz, dx, dy, dz, nx, ny, nz
 ):
     """Entry of the brick (dx, dy, dz) further than the one of entry ``base``, which may be none."""
-    if base >= 0:
-        return neighbors[base, SELF + 9 * dx + 3 * dy + dz]
-    return find_entry(heads, pages, groups, sheets, level, bx + dx, by + dy, bz + dz, nx, ny, nz)
+    if base < 0:
+        return find_entry(
+            heads, pages, groups, sheets, level, bx + dx, by + dy, bz + dz, nx, ny, nz
+        )
+    entry = neighbors[base, SELF + 9 * dx + 3 * dy + dz]
+    if entry <= FIRST_GROUP:
+        # One sheet here and several there: the point's side decides, if it is known
+        if nx == 0.0 and ny == 0.0 and nz == 0.0:
+            nx, ny, nz = sheets[base, 0], sheets[base, 1], sheets[base, 2]
+        entry = nearest_sheet(groups, sheets, entry, nx, ny, nz)
+    return entry
 
 
 @njit(cache=True, nogil=True)
@@ -242,66 +250,60 @@ def _blend_across(
     z, nx, ny, nz,
 ):  # fmt: skip
     """F_level in a cell that bricks share, or where corners do not exist; found is False if no
-    corner is stored."""
+    corner is stored. Where all eight exist, the sums are those of `blend`, bit by bit."""
     i, j, k = math.floor(x), math.floor(y), math.floor(z)
     fx, fy, fz = np.float32(x - i), np.float32(y - j), np.float32(z - k)
     bx, by, bz = i >> 3, j >> 3, k >> 3
     stored, absent = 0, 0
-    sr, sg, sb, sa, sw = F0, F0, F0, F0, F0
-    r0, g0, b0, a0 = F0, F0, F0, F0
-    same = True
     for c in range(8):
-        cx, cy, cz = c >> 2, (c >> 1) & 1, c & 1
-        ox, oy, oz = (i & 7) + cx, (j & 7) + cy, (k & 7) + cz
+        ox, oy, oz = (i & 7) + (c >> 2), (j & 7) + ((c >> 1) & 1), (k & 7) + (c & 1)
         e = corner_entry(
             heads, pages, groups, sheets, neighbors, level, base, bx, by, bz, ox >> 3, oy >> 3, oz
             >> 3, nx, ny, nz,
         )  # fmt: skip
-        if e < 0:
-            continue
-        t = ((ox & 7) << 6) + ((oy & 7) << 3) + (oz & 7)
-        if not needed(masks, e, t):
-            continue
-        slot = slots[e]
-        if slot == ABSENT:
-            absent |= 1 << c
-            continue
-        w = (fx if cx else F1 - fx) * (fy if cy else F1 - fy) * (fz if cz else F1 - fz)
-        r, g, b, a = read_texel(kind, slot, pool, tiles, t)
-        if stored == 0:
-            r0, g0, b0, a0 = r, g, b, a
-        same &= r == r0 and g == g0 and b == b0 and a == a0
-        stored += 1
-        wa = w * a
-        sr += wa * r
-        sg += wa * g
-        sb += wa * b
-        sa += wa
-        sw += w
+        if e >= 0 and needed(masks, e, _texel_index(ox, oy, oz)):
+            if slots[e] == ABSENT:
+                absent |= 1 << c
+            else:
+                stored |= 1 << c
     if stored == 0:
         return F0, F0, F0, F0, False
+    sr, sg, sb, sa, sw = F0, F0, F0, F0, F0
+    r0, g0, b0, a0 = F0, F0, F0, F0
+    n, same, opaque = 0, True, True
     for c in range(8):
-        if not (absent >> c) & 1:
+        if not ((stored | absent) >> c) & 1:
             continue
         cx, cy, cz = c >> 2, (c >> 1) & 1, c & 1
         w = (fx if cx else F1 - fx) * (fy if cy else F1 - fy) * (fz if cz else F1 - fz)
-        r, g, b, a, found = stored_value(
-            heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level + 1,
-            0.5 * (i + cx), 0.5 * (j + cy), 0.5 * (k + cz), nx, ny, nz,
-        )  # fmt: skip
-        if not found:
-            continue
+        if (stored >> c) & 1:
+            ox, oy, oz = (i & 7) + cx, (j & 7) + cy, (k & 7) + cz
+            e = corner_entry(
+                heads, pages, groups, sheets, neighbors, level, base, bx, by, bz, ox >> 3, oy >>
+                3, oz >> 3, nx, ny, nz,
+            )  # fmt: skip
+            r, g, b, a = read_texel(kind, slots[e], pool, tiles, _texel_index(ox, oy, oz))
+        else:
+            r, g, b, a, found = stored_value(
+                heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level +
+                1, 0.5 * (i + cx), 0.5 * (j + cy), 0.5 * (k + cz), nx, ny, nz,
+            )  # fmt: skip
+            if not found:
+                continue
+        if n == 0:
+            r0, g0, b0, a0 = r, g, b, a
         same &= r == r0 and g == g0 and b == b0 and a == a0
+        opaque &= a == F1
+        n += 1
         wa = w * a
-        sr += wa * r
-        sg += wa * g
-        sb += wa * b
-        sa += wa
-        sw += w
+        sr, sg, sb, sa, sw = sr + wa * r, sg + wa * g, sb + wa * b, sa + wa, sw + w
     if same:
         return r0, g0, b0, a0, True
     if not sw > F0:
         return F0, F0, F0, F0, False
+    if n == 8 and opaque and kind == SRGB8:
+        return sr, sg, sb, F1, True
     if sa > F0:
-        return sr / sa, sg / sa, sb / sa, sa / sw, True
+        scale = F1 / sa
+        return sr * scale, sg * scale, sb * scale, sa if n == 8 else sa / sw, True
     return F0, F0, F0, F0, True

@@ -5,9 +5,10 @@ import math
 import numpy as np
 from numba import njit
 
-from .octree_tables import find_entry
+from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet
 from .texel_codes import F0, F1
-from .texture_lookup import ABSENT, level_value, needed, read_texel
+from .texture_blocks import BLOCK, COLUMNS, block_values
+from .texture_lookup import ABSENT, needed, read_texel
 
 
 @njit(cache=True, nogil=True)
@@ -19,48 +20,81 @@ def sample(tables, slots, pool, tiles, kind, points, normals, footprints, begin,
     """
     heads, pages, groups, sheets = tables.heads, tables.pages, tables.groups, tables.sheets
     neighbors, masks = tables.neighbors, tables.masks
-    top = len(heads) - 1
-    scale = 1.0 / tables.texel
-    many_normals, many_footprints = len(normals) > 1, len(footprints) > 1
-    for n in range(begin, end):
+    top, scale = len(heads) - 1, 1.0 / tables.texel
+    levels, places, facing = np.empty(BLOCK, np.int64), np.empty((BLOCK, 3)), np.empty((BLOCK, 3))
+    colors, shares = np.empty((BLOCK, 4), np.float32), np.empty(BLOCK, np.float32)
+    targets, numbers = np.empty(BLOCK, np.int64), np.empty((BLOCK, COLUMNS), np.int64)
+    fractions = np.empty((BLOCK, 3), np.float32)
+    is_filtered = len(footprints) > 1 or footprints[0] * scale > 1.0
+    # The finer of the two levels of every point, then the coarser
+    for coarser in range(2 if is_filtered else 1):
+        at = begin
+        while at < end:
+            count, at = _gather(
+                points, normals, footprints, scale, top, at, end, coarser, targets, levels, shares,
+                places, facing, out,
+            )  # fmt: skip
+            block_values(
+                heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, count,
+                levels, places, facing, numbers, fractions, colors,
+            )  # fmt: skip
+            _scatter(colors, targets, shares, count, coarser, out)
+
+
+@njit(cache=True, nogil=True)
+def _gather(
+    points, normals, footprints, scale, top, at, end, coarser, targets, levels, shares, places,
+    facing, out,
+):  # fmt: skip
+    """Fill a block with points from ``at`` on; how many, and the first that did not fit.
+
+    In the coarser turn only those that lie between levels.
+    """
+    every_normal, every_footprint = int(len(normals) > 1), int(len(footprints) > 1)
+    count = 0
+    while at < end and count < BLOCK:
+        n = at
+        at += 1
         x, y, z = points[n, 0] * scale, points[n, 1] * scale, points[n, 2] * scale
         if not (abs(x) < 4.0e15 and abs(y) < 4.0e15 and abs(z) < 4.0e15):
-            out[n, :] = np.nan
+            out[n, 0] = out[n, 1] = out[n, 2] = out[n, 3] = np.nan
             continue
-        m = n if many_normals else 0
-        nx, ny, nz = normals[m, 0], normals[m, 1], normals[m, 2]
-        width = footprints[n if many_footprints else 0] * scale
-        level, between = 0, F0
+        width = footprints[n * every_footprint] * scale
+        level, share = coarser, F0
         if width > 1.0:
             detail = min(math.log2(width), np.float64(top))
             level = int(detail)
-            between = np.float32(detail - level)
-        fine = level
-        shrink = 1.0 / (1 << level)
-        x, y, z = x * shrink, y * shrink, z * shrink
-        r, g, b, a = F0, F0, F0, F0
-        while True:
-            r1, g1, b1, a1 = level_value(
-                heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level,
-                x, y, z, nx, ny, nz,
-            )  # fmt: skip
-            if level == fine:
-                r, g, b, a = r1, g1, b1, a1
-                if between == F0:
-                    break
+            share = np.float32(detail - level)
+            level += coarser
+            shrink = 1.0 / (1 << level)
+            x, y, z = x * shrink, y * shrink, z * shrink
+        if coarser and share == F0:
+            continue
+        targets[count], levels[count], shares[count] = n, level, share
+        places[count, 0], places[count, 1], places[count, 2] = x, y, z
+        m = n * every_normal
+        facing[count, 0], facing[count, 1] = normals[m, 0], normals[m, 1]
+        facing[count, 2] = normals[m, 2]
+        count += 1
+    return count, at
+
+
+@njit(cache=True, nogil=True)
+def _scatter(colors, targets, shares, count, coarser, out):
+    """Put a block's colours in place, or mix them in by their share and alpha if coarser."""
+    for q in range(count):
+        n = targets[q]
+        r, g, b, a = colors[q, 0], colors[q, 1], colors[q, 2], colors[q, 3]
+        if coarser:
+            r0, g0, b0, a0 = out[n, 0], out[n, 1], out[n, 2], out[n, 3]
+            if r == r0 and g == g0 and b == b0 and a == a0:
+                continue
+            w0, w1 = (F1 - shares[q]) * a0, shares[q] * a
+            a = w0 + w1
+            if a > F0:
+                r, g, b = (w0 * r0 + w1 * r) / a, (w0 * g0 + w1 * g) / a, (w0 * b0 + w1 * b) / a
             else:
-                if r != r1 or g != g1 or b != b1 or a != a1:
-                    w0, w1 = (F1 - between) * a, between * a1
-                    a = w0 + w1
-                    if a > F0:
-                        r, g, b = (
-                            (w0 * r + w1 * r1) / a,
-                            (w0 * g + w1 * g1) / a,
-                            (w0 * b + w1 * b1) / a,
-                        )
-                break
-            level += 1
-            x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
+                r, g, b = r0, g0, b0
         out[n, 0], out[n, 1], out[n, 2], out[n, 3] = r, g, b, a
 
 
@@ -68,25 +102,29 @@ def sample(tables, slots, pool, tiles, kind, points, normals, footprints, begin,
 def nearest(tables, slots, pool, tiles, kind, points, normals, begin, end, out):
     """``out[n]`` = the nearest stored texel's numbers, at the finest level stored there."""
     heads, pages, groups, sheets = tables.heads, tables.pages, tables.groups, tables.sheets
-    masks = tables.masks
-    top = len(heads)
-    scale = 1.0 / tables.texel
-    many_normals = len(normals) > 1
+    masks, top, scale = tables.masks, len(tables.heads), 1.0 / tables.texel
+    every_normal = int(len(normals) > 1)
+    code, at_x, at_y, at_z = np.int32(NO_ENTRY), np.int64(-1 << 62), np.int64(0), np.int64(0)
     for n in range(begin, end):
-        m = n if many_normals else 0
-        nx, ny, nz = normals[m, 0], normals[m, 1], normals[m, 2]
+        m = n * every_normal
         x, y, z = points[n, 0] * scale, points[n, 1] * scale, points[n, 2] * scale
+        r, g, b, a = F0, F0, F0, F0
         if not (abs(x) < 4.0e15 and abs(y) < 4.0e15 and abs(z) < 4.0e15):
-            out[n, :] = np.nan
+            out[n, 0] = out[n, 1] = out[n, 2] = out[n, 3] = np.nan
             continue
-        out[n, :] = F0
         for level in range(top):
             i, j, k = math.floor(x + 0.5), math.floor(y + 0.5), math.floor(z + 0.5)
-            e = find_entry(heads, pages, groups, sheets, level, i >> 3, j >> 3, k >> 3, nx, ny, nz)
+            bx, by, bz = i >> 3, j >> 3, k >> 3
+            if level > 0 or (bx ^ at_x) | (by ^ at_y) | (bz ^ at_z):
+                code = find_code(heads, pages, level, bx, by, bz)
+                at_x, at_y, at_z = bx if level == 0 else np.int64(-1 << 62), by, bz
+            e = code
+            if e <= FIRST_GROUP:
+                e = nearest_sheet(groups, sheets, e, normals[m, 0], normals[m, 1], normals[m, 2])
             if e >= 0 and slots[e] != ABSENT:
                 t = ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)
                 if needed(masks, e, t):
                     r, g, b, a = read_texel(kind, slots[e], pool, tiles, t)
-                    out[n, 0], out[n, 1], out[n, 2], out[n, 3] = r, g, b, a
                     break
             x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
+        out[n, 0], out[n, 1], out[n, 2], out[n, 3] = r, g, b, a

@@ -26,7 +26,7 @@ from ..progress import Progress, silent
 from ..sdf.memory import available_memory, estimate_bricks
 
 Triangles = Float64[np.ndarray, "m 3 3"]
-Entries = Int32[np.ndarray, " n"]
+Entries = Int32[np.ndarray, " _"]  # no name: what goes in and what comes out differ in number
 
 MAX_LEVELS = 24
 LARGEST_RESOLUTION = 24000  # so that one root page of 4096 bricks a side covers everything

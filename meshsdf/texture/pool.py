@@ -26,11 +26,19 @@ class BrickPool:
         The channels that are used.
     holders : (capacity,) int32
         How many need each slot; those that none needs are free.
+    born : (capacity,) int64
+        In which generation each slot was taken; a generation begins with every recording.
+    generation : int
+        The one that lasts.
     """
 
     def __init__(self, channels: Mapping[str, Channel]) -> None:
         self.channels = dict(channels)
         self.holders = np.zeros(FIRST_CAPACITY, np.int32)
+        self.born = np.zeros(FIRST_CAPACITY, np.int64)
+        self.generation = 0
+        self._recordings: list[int] = []  # generations that began them, outermost first
+        self._waiting: list[int] = []  # slots that none needs, but that recordings may ask for
         self.arrays: dict[str, np.ndarray] = {}
         self._free: list[int] = list(range(FIRST_CAPACITY - 1, -1, -1))
         self.use("base")
@@ -68,6 +76,7 @@ class BrickPool:
             self._grow()
         slots = np.array([self._free.pop() for _ in range(n)], np.int32)
         self.holders[slots] = 1
+        self.born[slots] = self.generation
         for name, array in self.arrays.items():
             array[slots] = self.channels[name].nothing
         return slots
@@ -84,15 +93,44 @@ class BrickPool:
         np.add.at(self.holders, slots[slots >= 0], np.int32(1))
 
     def drop(self, slots: Slots) -> None:
-        """One fewer needs each of those that are slots; what none needs is free again."""
+        """One fewer needs each of those that are slots; what none needs is free again.
+
+        While a recording lasts, slots from before it keep their texels.
+        """
         dropped = slots[slots >= 0]
         np.subtract.at(self.holders, dropped, np.int32(1))
         unique = np.unique(dropped)
-        self._free.extend(unique[self.holders[unique] == 0][::-1].tolist())
+        unneeded = unique[self.holders[unique] == 0][::-1]
+        known = self._is_known(unneeded)
+        self._waiting.extend(unneeded[known].tolist())
+        self._free.extend(unneeded[~known].tolist())
+
+    def is_shared(self, slots: Slots) -> np.ndarray:
+        """Whether others hold the slots, too, or the texels are from before a recording."""
+        return (self.holders[slots] > 1) | self._is_known(slots)
+
+    def begin_recording(self) -> None:
+        """From now on keep the texels of every slot that is held."""
+        self.generation += 1
+        self._recordings.append(self.generation)
+
+    def end_recording(self) -> None:
+        """End the latest recording; what it wants to keep must be held by now."""
+        self._recordings.pop()
+        if not self._recordings:
+            waiting = np.unique(np.array(self._waiting, np.int64))
+            self._free.extend(waiting[self.holders[waiting] == 0][::-1].tolist())
+            self._waiting = []
+
+    def _is_known(self, slots: Slots) -> np.ndarray:
+        if not self._recordings:
+            return np.zeros(len(slots), bool)
+        return self.born[slots] < self._recordings[-1]
 
     def _grow(self) -> None:
         before = len(self.holders)
         self.holders = np.concatenate([self.holders, np.zeros(before, np.int32)])
+        self.born = np.concatenate([self.born, np.zeros(before, np.int64)])
         for name, array in self.arrays.items():
             # New pages of memory are taken only when they are written
             grown = np.empty((2 * before, TEXELS), array.dtype)

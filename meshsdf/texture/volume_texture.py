@@ -6,6 +6,9 @@ are bricks, found through the page table that distance bands use, too.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from jaxtyping import Float32, Float64
@@ -62,6 +65,8 @@ class VolumeTexture:
         self.surface: Mesh | None = None
         self._closest: ClosestPoint | None = None
         self._next_number = 0
+        self._layers_ever: WeakValueDictionary[int, Layer] = WeakValueDictionary()
+        self.flattened: Any = None  # what `layers.shown` keeps
 
     @classmethod
     def around(
@@ -84,14 +89,51 @@ class VolumeTexture:
         slots = np.full(self.octree.n_entries, ABSENT, np.int32)
         slots[self.octree.level_first[-2] :] = self.tiles.code({"base": self.encoded_color(color)})
         number, self._next_number = self._next_number, self._next_number + 1
-        layer = Layer(number, name or f"layer {number + 1}", slots)
+        layer = self.revived(Layer(number, name or f"layer {number + 1}", slots))
         self.layers.append(layer)
         return layer
+
+    def revived(self, layer: Layer) -> Layer:
+        """The layer that had this number once, made like this one; if there was none, this one.
+
+        A number comes again only if the layer that had it was undone; changes may know that one.
+        """
+        old = self._layers_ever.get(layer.number)
+        if old is None or old in self.layers:
+            self._layers_ever[layer.number] = layer
+            return layer
+        vars(old).update(vars(layer))
+        return old
 
     def drop_layer(self, layer: Layer) -> None:
         """Take a layer away, with its texels."""
         self.layers.remove(layer)
         self.pool.drop(layer.slots)
+        layer.slots = np.full_like(layer.slots, ABSENT)
+
+    def move_layer(self, layer: Layer, place: int) -> None:
+        """Put a layer at a place in the list: 0 is the lowest, -1 the highest.
+
+        Raises
+        ------
+        TextureError
+            There is no such place.
+        """
+        n = len(self.layers)
+        if not -n <= place < n:
+            what = f"there is no place {place} among {n} layers"
+            raise TextureError(what, "move_layer(place=...)", f"use {-n} to {n - 1}")
+        self.layers.remove(layer)
+        self.layers.insert(place % n, layer)
+
+    def duplicate_layer(self, layer: Layer, name: str = "") -> Layer:
+        """Put a copy of a layer above it; they share their texels until one is changed."""
+        number, self._next_number = self._next_number, self._next_number + 1
+        slots = layer.slots.copy()
+        twin = replace(layer, number=number, name=name or f"{layer.name} copy", slots=slots)
+        self.pool.hold(slots)
+        self.layers.insert(self.layers.index(layer) + 1, twin)
+        return twin
 
     def encoded_color(self, color: Color) -> np.integer:
         """The texel of a linear colour; alpha is 1 if it has none.
@@ -153,6 +195,7 @@ class VolumeTexture:
             raise TextureError(what, "channel=...", f"use one of {', '.join(self.channels)}")
         if project:
             points, normals = self.on_surface(points)
+        self._fill_seen(layer, points, normals, footprint)
         slots = (layer or self._shown()).slots
         pool = self.pool.arrays.get(channel)
         kind = self.channels[channel]
@@ -218,13 +261,14 @@ class VolumeTexture:
     def writable(self, layer: Layer, entries: Entries) -> np.ndarray:
         """Slots of the entries that this layer alone needs, made from what it stores there.
 
-        A tile becomes a brick of its colour; a brick that others hold is copied; an entry that is
-        not stored gets a brick in which nothing was written.
+        A tile becomes a brick of its colour; a brick that others hold, or that was there when a
+        recording began, is copied; an entry that is not stored gets a brick in which nothing was
+        written.
         """
         slots = layer.slots[entries]
         fresh = slots < 0
         shared = np.zeros(len(slots), bool)
-        shared[~fresh] = self.pool.holders[slots[~fresh]] > 1
+        shared[~fresh] = self.pool.is_shared(slots[~fresh])
         if fresh.any():
             taken = self.pool.take(int(fresh.sum()))
             self._spread_tiles(slots[fresh], taken)
@@ -267,12 +311,19 @@ class VolumeTexture:
         first = self.octree.tables.texel_first
         return np.concatenate([[0], np.cumsum(first[entries + 1] - first[entries])])
 
+    def _fill_seen(self, layer, points, normals, footprint) -> None:
+        """Evaluate what procedural layers show at points."""
+        for one in [layer] if layer else self.layers:
+            if getattr(one, "function", None) is not None and (layer or one.visible):
+                from .procedural_layer import fill_seen  # which imports this module
+
+                widths = np.atleast_1d(np.asarray(footprint, np.float64))
+                fill_seen(self, one, points, normals, widths)
+
     def _shown(self) -> Layer:
-        if len(self.layers) != 1:
-            raise TextureError(
-                f"the texture has {len(self.layers)} layers", "colors()", "name the layer"
-            )
-        return self.layers[0]
+        from .layers import shown  # which imports this module
+
+        return shown(self)
 
     def _nothing(self) -> int:
         return self.tiles.code({})

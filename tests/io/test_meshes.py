@@ -63,9 +63,13 @@ def test_another_reader_finds_the_same_shape(tmp_path, suffix):
 def test_the_same_mesh_gives_the_same_bytes_and_is_left_alone(tmp_path, suffix):
     mesh = painted_tetrahedron()
     before = mesh.vertices.copy(), mesh.faces.copy(), mesh.uv.copy(), mesh.vertex_colors.copy()
-    write_mesh(tmp_path / f"a{suffix}", mesh)
-    write_mesh(tmp_path / f"b{suffix}", mesh)
-    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+    for folder in "ab":
+        (tmp_path / folder).mkdir()
+        write_mesh(tmp_path / folder / f"c{suffix}", mesh)
+    files = sorted(file.name for file in (tmp_path / "a").iterdir())
+    assert len(files) == (3 if suffix == ".obj" else 1)  # materials and an image beside it
+    for name in files:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     after = mesh.vertices, mesh.faces, mesh.uv, mesh.vertex_colors
     for old, new in zip(before, after, strict=True):
         assert_array_equal(old, new)

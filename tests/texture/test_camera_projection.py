@@ -84,7 +84,7 @@ def test_what_a_mesh_hides_is_what_libigl_says():
     faces, hidden = knot.faces.astype(np.int64), np.zeros(400, bool)
     for k, way in enumerate(eye - points):
         hits = igl.ray_mesh_intersect(points[k], way, knot.vertices, faces)
-        hidden[k] = any(1e-6 < hit[3] < 1 for hit in hits or [])  # beyond the point's own face
+        hidden[k] = any(1e-6 < hit[1] < 1 for hit in hits or [])  # beyond the point's own face
     assert 40 < reached.sum() < 360
     assert_array_equal(reached, ~hidden)
 

@@ -239,6 +239,8 @@ def test_normals_of_stretched_shapes_are_carried_as_normals():
         (lambda i: Decal(i, steepest=200), "steepest is 200"),
         (lambda i: Planar(i, matrix=np.diag([1.0, 1, 0, 1])), "flattens space"),
         (lambda i: Planar(i, matrix=np.diag([1.0, 1, 1, 2])), "last row"),
+        (lambda i: Planar(i, wrap="bend"), "unknown wrap 'bend'"),
+        (lambda i: Planar(i, space="object"), "unknown space 'object'"),
         (lambda i: Triplanar(i)(np.zeros((1, 3))), "no normals"),
         (lambda i: Planar(i)(np.full((2, 3), np.nan)), "2 of 2 points"),
         (lambda i: Planar(i)(np.zeros((2, 3)), np.zeros((1, 3))), "2 points and 1 normals"),

@@ -1,0 +1,43 @@
+"""Put the texels that exist side by side, and back into their bricks."""
+
+import numpy as np
+from numba import njit
+
+ONE = np.uint64(1)
+
+
+@njit(cache=True, nogil=True)
+def count_written(masks, entries, slots, pool, nothing, counts):
+    """``counts[i]`` = texels to pack of ``entries[i]``: all, or 0 if none was ever written."""
+    for i in range(len(entries)):
+        e, slot = entries[i], slots[i]
+        n, written = 0, False
+        for t in range(512):
+            if (masks[e, t >> 6] >> np.uint64(t & 63)) & ONE:
+                n += 1
+                written |= pool[slot, t] != nothing
+        counts[i] = n if written else 0
+
+
+@njit(cache=True, nogil=True)
+def pack_bricks(masks, entries, slots, pool, packed):
+    """Fill ``packed`` with the texels that exist of the entries, one entry after another."""
+    at = 0
+    for i in range(len(entries)):
+        e, slot = entries[i], slots[i]
+        for t in range(512):
+            if (masks[e, t >> 6] >> np.uint64(t & 63)) & ONE:
+                packed[at] = pool[slot, t]
+                at += 1
+
+
+@njit(cache=True, nogil=True)
+def unpack_bricks(masks, entries, slots, packed, pool):
+    """Put back into the slots of the entries what `pack_bricks` packed."""
+    at = 0
+    for i in range(len(entries)):
+        e, slot = entries[i], slots[i]
+        for t in range(512):
+            if (masks[e, t >> 6] >> np.uint64(t & 63)) & ONE:
+                pool[slot, t] = packed[at]
+                at += 1

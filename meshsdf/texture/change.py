@@ -1,0 +1,246 @@
+"""What edits of a texture changed, so that they can be taken back and done again.
+
+A brick that was there when a recording began is never written again while somebody needs it:
+`VolumeTexture.writable` copies it. So a change is a list of slots before and after, undoing it
+swaps slots, and what it costs in memory are the bricks that were touched.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int32
+
+from ..errors import TextureError
+from ..kernels.texture_lookup import ABSENT
+from .layer import Layer
+from .octree import Entries
+from .volume_texture import VolumeTexture
+
+Slots = Int32[np.ndarray, " n"]
+
+BRICKS_AT_ONCE = 4096  # compared in one go, so that little memory is needed
+
+
+@dataclass(frozen=True, eq=False)
+class SlotChange:
+    """Entries of one layer whose slots changed; a layer that is not there stores nothing."""
+
+    layer: Layer
+    entries: Entries
+    before: Slots
+    after: Slots
+
+
+@dataclass(frozen=True, eq=False)
+class LayerState:
+    """A layer in the list, with every attribute but its slots."""
+
+    layer: Layer
+    attributes: dict[str, Any]
+
+    @classmethod
+    def of(cls, layer: Layer) -> "LayerState":
+        """What a layer is like now."""
+        names = [one.name for one in fields(layer) if one.name != "slots"]
+        return cls(layer, {name: getattr(layer, name) for name in names})
+
+    def same(self, other: "LayerState") -> bool:
+        """Whether it is the same layer with equal attributes."""
+        return self.layer is other.layer and self.attributes == other.attributes
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """The list of layers, and the number that the next one gets."""
+
+    layers: tuple[LayerState, ...]
+    next_number: int
+
+    @classmethod
+    def of(cls, texture: VolumeTexture) -> "Stack":
+        """The list as it is now."""
+        return cls(tuple(map(LayerState.of, texture.layers)), texture._next_number)
+
+    def same(self, other: "Stack") -> bool:
+        """Whether the lists are alike."""
+        if self.next_number != other.next_number or len(self.layers) != len(other.layers):
+            return False
+        return all(a.same(b) for a, b in zip(self.layers, other.layers, strict=True))
+
+    def restore(self, texture: VolumeTexture) -> None:
+        """Make the texture's list like this one."""
+        for state in self.layers:
+            for name, value in state.attributes.items():
+                setattr(state.layer, name, value)
+        texture.layers[:] = [state.layer for state in self.layers]
+        texture._next_number = self.next_number
+
+
+@dataclass(eq=False)
+class Change:
+    """What a recording changed; it is filled when the recording ends.
+
+    Attributes
+    ----------
+    slots : list of SlotChange
+        Layer by layer; the texture's pool keeps them, before and after.
+    before, after : Stack
+        The list of layers and their attributes.
+    is_done : bool
+        False after `undo`, until `redo`.
+    """
+
+    before: Stack
+    after: Stack
+    slots: list[SlotChange] = field(default_factory=list)
+    is_done: bool = True
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing changed."""
+        return not self.slots and self.before.same(self.after)
+
+    @property
+    def n_entries(self) -> int:
+        """Entries whose slots changed, over all layers."""
+        return sum(len(one.entries) for one in self.slots)
+
+    def undo(self, texture: VolumeTexture) -> None:
+        """Put everything back as it was before; changes made later must be undone first.
+
+        Raises
+        ------
+        TextureError
+            It is undone already.
+        """
+        self._require(True, "undone")
+        for one in self.slots:
+            _swap(texture, one.layer, one.entries, one.before)
+        self.before.restore(texture)
+        self.is_done = False
+
+    def redo(self, texture: VolumeTexture) -> None:
+        """Make the change again after `undo`.
+
+        Raises
+        ------
+        TextureError
+            It is not undone.
+        """
+        self._require(False, "done")
+        for one in self.slots:
+            _swap(texture, one.layer, one.entries, one.after)
+        self.after.restore(texture)
+        self.is_done = True
+
+    def n_bytes(self, texture: VolumeTexture) -> int:
+        """Memory that only this change needs: bricks of the other side of it, and the lists."""
+        per_brick = sum(array[0].nbytes for array in texture.pool.arrays.values())
+        total = 0
+        for one in self.slots:
+            kept = one.before if self.is_done else one.after
+            lists = one.entries.nbytes + one.before.nbytes + one.after.nbytes
+            total += int(np.count_nonzero(kept >= 0)) * per_brick + lists
+        return total
+
+    def release(self, texture: VolumeTexture) -> None:
+        """Let go of the bricks; the change can be neither undone nor redone afterwards."""
+        for one in self.slots:
+            texture.pool.drop(one.before)
+            texture.pool.drop(one.after)
+        self.slots = []
+
+    def _require(self, done: bool, word: str) -> None:
+        if self.is_done is not done:
+            what = f"the change is {word} already"
+            raise TextureError(what, "Change", "undo and redo a change in turn")
+
+
+@contextmanager
+def recording(texture: VolumeTexture) -> Iterator[Change]:
+    """Record what the body changes in layers' slots, in their list and in their attributes.
+
+    The change is complete when the body has ended. If it raises, everything is put back as it was.
+    Recordings may be nested. Bricks that end with the texels they began with count as unchanged.
+
+    Notes
+    -----
+    Cost: copying and comparing the slots of all layers, 4 bytes each, and comparing the texels of
+    touched bricks.
+
+    Examples
+    --------
+    >>> from meshsdf.mesh import icosphere
+    >>> texture = VolumeTexture.around(icosphere(subdivisions=2), resolution=16)
+    >>> with recording(texture) as change:
+    ...     layer = texture.add_layer("paint", color=(1.0, 0.0, 0.0))
+    >>> change.undo(texture)
+    >>> texture.layers
+    []
+    """
+    stack = Stack.of(texture)
+    slots = {layer: layer.slots.copy() for layer in texture.layers}
+    change = Change(stack, stack)
+    texture.pool.begin_recording()
+    try:
+        try:
+            yield change
+        except BaseException:
+            _collect(texture, change, slots)
+            change.undo(texture)
+            change.release(texture)
+            raise
+        _collect(texture, change, slots)
+    finally:
+        texture.pool.end_recording()
+
+
+def _collect(texture: VolumeTexture, change: Change, before: dict[Layer, Slots]) -> None:
+    """Fill the change, and hold its slots."""
+    change.after = Stack.of(texture)
+    for layer in dict.fromkeys([*before, *texture.layers]):
+        old = before[layer] if layer in before else np.full_like(layer.slots, ABSENT)
+        entries = np.flatnonzero(old != layer.slots).astype(np.int32)
+        entries = _really_changed(texture, layer, entries, old)
+        if len(entries):
+            one = SlotChange(layer, entries, old[entries], layer.slots[entries])
+            texture.pool.hold(one.before)
+            texture.pool.hold(one.after)
+            change.slots.append(one)
+
+
+def _really_changed(texture: VolumeTexture, layer: Layer, entries: Entries, old: Slots) -> Entries:
+    """Those of the entries whose texels differ; the others get their old slots back."""
+    new = layer.slots
+    bricks = entries[new[entries] >= 0]
+    bricks = bricks[old[bricks] != ABSENT]
+    same = np.zeros(len(bricks), bool)
+    for begin in range(0, len(bricks), BRICKS_AT_ONCE):
+        part = slice(begin, begin + BRICKS_AT_ONCE)
+        same[part] = _same_texels(texture, bricks[part], old[bricks[part]], new[bricks[part]])
+    _swap(texture, layer, bricks[same], old[bricks[same]])
+    return entries[~np.isin(entries, bricks[same])]
+
+
+def _same_texels(texture: VolumeTexture, entries: Entries, old: Slots, new: Slots) -> np.ndarray:
+    """Whether bricks hold the same as other bricks or tiles, where texels exist."""
+    is_tile = old < 0
+    bits = np.unpackbits(texture.octree.tables.masks[entries].view(np.uint8), bitorder="little")
+    unneeded = bits.reshape(len(entries), -1) == 0
+    same = np.ones(len(entries), bool)
+    for name, array in texture.pool.arrays.items():
+        texels = np.where(is_tile[:, None], array.dtype.type(0), array[np.maximum(old, 0)])
+        for i in np.flatnonzero(is_tile):
+            texels[i] = texture.tiles.texel(int(old[i]))[name]
+        same &= ((texels == array[new]) | unneeded).all(axis=1)
+    return same
+
+
+def _swap(texture: VolumeTexture, layer: Layer, entries: Entries, slots: Slots) -> None:
+    """Let a layer store other slots, which somebody holds or held when the recording began."""
+    texture.pool.hold(slots)
+    texture.pool.drop(layer.slots[entries])
+    layer.slots[entries] = slots
