@@ -92,6 +92,7 @@ class Background(click.ParamType):
     type=PositiveNumber(),
     help="Distance at the upper end of the colours, world units.  [default: the largest seen]",
 )
+@click.option("--texture", type=path, help="Paint it with a texture (.mtex).")
 @force_option
 @json_option
 def command(
@@ -105,13 +106,17 @@ def command(
     background: tuple[float, float, float] | None,
     error_of: str | None,
     scale: float | None,
+    texture: str | None,
     force: bool,
     as_json: bool,
 ) -> int:
     """Draw MESH, or the surface of a volume, as a picture, OUT (.png, .jpg or .exr).
 
-    The light moves with the camera. Colours and textures of the mesh are shown.
+    The light moves with the camera. Colours and textures of the mesh are shown. MESH may be a
+    texture (.mtex), which is drawn on its own mesh.
     """
+    if texture is not None and error_of is not None:
+        raise click.UsageError("--texture and --error-of exclude each other")
     if scale is not None and error_of is None:
         raise click.UsageError("--scale is for --error-of")
     console = Console("render", as_json=as_json)
@@ -120,7 +125,10 @@ def command(
     from ..io.pictures import check_picture, write_picture
     from ..ray import frame, render_distances, render_mesh
 
-    check_input(mesh)
+    if mesh.lower().endswith(".mtex") and texture is None:
+        texture = mesh
+    if mesh != texture:
+        check_input(mesh)
     if error_of is not None:
         check_input(error_of, kind="mesh")
     check_picture(out, force)
@@ -130,7 +138,8 @@ def command(
     facts = {"input": mesh, "output": out, "width": width, "height": height, "view": view}
     words = ""
     with console.stage("load"):
-        loaded = _read(mesh, console)
+        painted = None if texture is None else _texture(texture, console)
+        loaded = painted.surface if mesh == texture else _read(mesh, console)
         other = error_of and read_mesh(error_of, warn=console.warn)
     with console.stage("render"):
         if other:
@@ -146,7 +155,13 @@ def command(
                 f"{drawn.mean_seen:.6g} {SEEN}"
             )
         else:
-            picture = render_mesh(loaded, frame(loaded, view, width / height, up=up), **look)
+            camera = frame(loaded, view, width / height, up=up)
+            if painted is not None:
+                from .texture_look import texture_paint
+
+                look["paint"] = texture_paint(painted, loaded, camera, height)
+                facts |= {"texture": texture}
+            picture = render_mesh(loaded, camera, **look)
     with console.stage("write"):
         write_picture(out, picture, force=force)
     seconds = console.timings("load", "render", "write")
@@ -161,6 +176,14 @@ def _linear(background: tuple[float, float, float] | None):
     from ..srgb import linear_from_srgb
 
     return None if background is None else linear_from_srgb(np.array(background))
+
+
+def _texture(path: str, console: Console):
+    """The texture of a project."""
+    from ..texture.journal import Project
+
+    with Project.open(path, warn=console.warn) as project:
+        return project.texture
 
 
 def _read(path: str, console: Console):

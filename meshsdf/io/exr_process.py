@@ -33,19 +33,22 @@ ROOM, ROOM_PER_BYTE = 1 << 31, 6
 LEAST_SECONDS, BYTES_PER_SECOND = 60, 2e6
 """How long it may take."""
 
-_SCRIPT = """
+_LIMITS = """
 import sys
 try:
     import resource
-    room, seconds = int(sys.argv[3]), int(sys.argv[4])
+    room, seconds = int(sys.argv[1]), int(sys.argv[2])
     resource.setrlimit(resource.RLIMIT_AS, (room, room))
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 except ImportError:
     pass
 import numpy, OpenEXR
+"""
+
+_SCRIPT = """
 with open("pixels", "wb") as out:
-    for number in range(int(sys.argv[1])):
+    for number in range(int(sys.argv[3])):
         with OpenEXR.File(f"{number}.exr", separate_channels=True) as file:
             (part,) = file.parts
             out.write(numpy.ascontiguousarray(part.channels["Y"].pixels).data)
@@ -78,7 +81,7 @@ def unpacked_apart(parts: list[Part], chunks: list[list[bytes]]) -> list[np.ndar
         folder = Path(name)
         for number, (part, packed) in enumerate(zip(parts, chunks, strict=True)):
             (folder / f"{number}.exr").write_bytes(plain_file(part, packed))
-        _run(folder, len(parts), n_bytes)
+        run_apart(folder, _SCRIPT, [str(len(parts))], n_bytes)
         pixels = folder / "pixels"
         if not pixels.is_file() or pixels.stat().st_size != n_bytes:
             raise ValueError("a chunk does not give the bytes of its lines")
@@ -115,11 +118,19 @@ def plain_file(part: Part, packed: list[bytes]) -> bytes:
     return head + ends[:-1].astype("<u8").tobytes() + b"".join(body)
 
 
-def _run(folder: Path, n_parts: int, n_bytes: int) -> None:
-    """Let the process write the file "pixels"; ValueError unless it does so without a word."""
+def run_apart(folder: Path, script: str, arguments: list[str], n_bytes: int) -> None:
+    """Run a script that unpacks ``n_bytes`` of pixels with OpenEXR, in a folder, within limits.
+
+    Raises
+    ------
+    ValueError
+        It does not end well, or not without a word, or not in time.
+    UnsuitedError
+        There is no other process to be had.
+    """
     room = ROOM + ROOM_PER_BYTE * n_bytes
     seconds = int(LEAST_SECONDS + n_bytes / BYTES_PER_SECOND)
-    command = [sys.executable, "-c", _SCRIPT, str(n_parts), str(n_bytes), str(room), str(seconds)]
+    command = [sys.executable, "-c", _LIMITS + script, str(room), str(seconds), *arguments]
     # Its libraries need no threads, whose stacks would count as memory
     quiet = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     try:

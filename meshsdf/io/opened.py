@@ -27,27 +27,27 @@ def opened_reader(path: str | os.PathLike) -> Iterator[VdbReader]:
 
 
 @contextmanager
-def refusing(path: Path) -> Iterator[Path]:
+def refusing(path: Path, thing: str = "volume") -> Iterator[Path]:
     """Yield a file, or a volume that is a folder; what is found wrong with it becomes IoError."""
     try:
         yield path
     except UnsuitedError as error:
         raise IoError(f"{path.name}: {error}", _place(path), error.fix) from error
     except GridError as error:
-        raise _unreadable(path, error.what) from error
+        raise _unreadable(path, thing, error.what) from error
     except MemoryError as error:
-        raise _unreadable(path, "it does not fit in memory") from error
+        raise _unreadable(path, thing, "it does not fit in memory") from error
     except OSError as error:
-        raise _unreadable(path, error.strerror or str(error)) from error
+        raise _unreadable(path, thing, error.strerror or str(error)) from error
     except RecursionError as error:
-        raise _unreadable(path, "its parts are nested too deeply") from error
+        raise _unreadable(path, thing, "its parts are nested too deeply") from error
     except (ValueError, zlib.error, EOFError, OverflowError) as error:
-        raise _unreadable(path, str(error)) from error
+        raise _unreadable(path, thing, str(error)) from error
 
 
-def _unreadable(path: Path, reason: str) -> IoError:
+def _unreadable(path: Path, thing: str, reason: str) -> IoError:
     return IoError(
-        f"{path.name} is not a readable volume: {' '.join(reason.split())[:300]}",
+        f"{path.name} is not a readable {thing}: {' '.join(reason.split())[:300]}",
         _place(path),
         "write it again; if it was copied, copy it again",
     )

@@ -1,4 +1,4 @@
-"""Pictures to files: PNG and JPEG in sRGB, OpenEXR in linear light with all its range."""
+"""Pictures in files: PNG and JPEG in sRGB, OpenEXR in linear light with all its range."""
 
 import errno
 import os
@@ -10,6 +10,10 @@ from jaxtyping import Float32
 from ..errors import IoError
 from ..ray.images import jpeg_bytes, png_bytes
 from .atomic import atomic_write, check_output
+from .exr_picture import read_exr_picture
+from .images import read_image
+from .opened import refusing
+from .registry import checked_input
 
 Picture = Float32[np.ndarray, "h w 4"]
 ENCODERS = {".png": png_bytes, ".jpg": jpeg_bytes, ".jpeg": jpeg_bytes}
@@ -58,6 +62,32 @@ def write_picture(path: str | os.PathLike, picture: Picture, *, force: bool = Fa
             temporary.write_bytes(ENCODERS[suffix](picture))
         else:
             _write_exr(temporary, picture)
+
+
+def read_picture(path: str | os.PathLike) -> np.ndarray:
+    """Read an image that is to be a texture.
+
+    Returns
+    -------
+    (h, w, c) uint8 or float32
+        8-bit values as stored (sRGB), c = 1 to 4, from whatever Pillow reads; linear values from
+        OpenEXR, RGB not multiplied by alpha. First row on top.
+
+    Raises
+    ------
+    IoError
+        There is no such file, it is no image or damaged, or too large.
+    """
+    path = checked_input(path)
+    if path.suffix.lower() == ".exr":
+        with refusing(path, "image"):
+            return read_exr_picture(path)
+    said: list[str] = []
+    image = read_image(path, said.append)
+    if image is None:
+        what = f"{path.name} is not a readable image: {said[0].split(': ', 1)[-1]}"
+        raise IoError(what, f"file {path}", "save it again, as PNG or JPEG")
+    return image
 
 
 def _write_exr(path: Path, picture: Picture) -> None:

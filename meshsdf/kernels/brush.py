@@ -327,7 +327,12 @@ def lay(
                 continue
             below = read_texel(kind, base[row], pool, tiles, t)
             if action == COPY:
-                r, g, b, a = source[row, t, 0], source[row, t, 1], source[row, t, 2], source[row, t, 3]
+                r, g, b, a = (
+                    source[row, t, 0],
+                    source[row, t, 1],
+                    source[row, t, 2],
+                    source[row, t, 3],
+                )
             if fades:
                 out = below[0], below[1], below[2], below[3] * (F1 - share)
             else:

@@ -136,10 +136,10 @@ def _climb(nodes):
 
 @njit(cache=True, nogil=True)
 def _meet(a, b):
+    apart = False
     for axis in range(3):
-        if a[axis] > b[axis + 3] or a[axis + 3] < b[axis]:
-            return False
-    return True
+        apart |= a[axis] > b[axis + 3] or a[axis + 3] < b[axis]
+    return not apart
 
 
 @njit(cache=True, nogil=True)

@@ -70,6 +70,38 @@ def _entry(boxes, node, first, ox, oy, oz, ix, iy, iz):
 
 
 @njit(cache=True, nogil=True)
+def _entry_at(boxes, node, x, y, z, far_x, far_y, far_z, ox, oy, oz, ix, iy, iz):
+    """As `_entry`, by the six places of the box's near and far sides in its node."""
+    near = max((boxes[node, x] - ox) * ix, 0.0)
+    near = max((boxes[node, y] - oy) * iy, near)
+    near = max((boxes[node, z] - oz) * iz, near)
+    far = (boxes[node, far_x] - ox) * ix
+    far = min((boxes[node, far_y] - oy) * iy, far)
+    far = min((boxes[node, far_z] - oz) * iz, far)
+    return near * EARLIER if near <= far * LATER else np.inf
+
+
+@njit(cache=True, nogil=True)
+def entries_of(rows, n, ix, iy, iz, entries):
+    """``entries[c]`` = where a ray enters box c of n; infinite if never.
+
+    ``rows`` (6, n) holds the boxes relative to the ray's origin: lower xyz, upper xyz.
+    """
+    x, far_x = rows[3 * (ix < 0.0)], rows[3 * (ix >= 0.0)]
+    y, far_y = rows[1 + 3 * (iy < 0.0)], rows[1 + 3 * (iy >= 0.0)]
+    z, far_z = rows[2 + 3 * (iz < 0.0)], rows[2 + 3 * (iz >= 0.0)]
+    # As `_entry`, in a form that the compiler turns into vector instructions
+    for c in range(n):
+        near = max(x[c] * ix, 0.0)
+        near = max(y[c] * iy, near)
+        near = max(z[c] * iz, near)
+        far = far_x[c] * ix
+        far = min(far_y[c] * iy, far)
+        far = min(far_z[c] * iz, far)
+        entries[c] = near * EARLIER if near <= far * LATER else np.inf
+
+
+@njit(cache=True, nogil=True)
 def _hit(corners, s, kx, ky, kz, sign, sx, sy, px, py, pz):
     """(t, weight of the first corner, of the second) where the ray hits triangle s; t MISS."""
     # Corners relative to the origin, sheared so that the ray is the z axis
@@ -151,23 +183,41 @@ def nearest_hits(
 
 
 @njit(cache=True, nogil=True)
-def is_in_the_way(
-    ox, oy, oz, dx, dy, dz, longest, corners, children, child_boxes, stack
-):  # fmt: skip
-    """Whether any triangle is hit within ``longest`` world units of o, relative to the centre."""
+def prepared(ox, oy, oz, dx, dy, dz):
+    """(reciprocals of the direction, the ray's length per unit of it, what `_hit` takes)."""
     kx, ky, kz, sign, length, sx, sy = _axes(dx, dy, dz)
     largest = max(abs(dx), abs(dy), abs(dz))
-    ix, iy, iz = _reciprocal(dx / largest), _reciprocal(dy / largest), _reciprocal(dz / largest)
+    slopes = _reciprocal(dx / largest), _reciprocal(dy / largest), _reciprocal(dz / largest)
     px = ox if kx == 0 else (oy if kx == 1 else oz)
     py = ox if ky == 0 else (oy if ky == 1 else oz)
     pz = ox if kz == 0 else (oy if kz == 1 else oz)
-    end = longest / length
-    n_stack, code = 0, np.int32(0)
+    return slopes, length, (kx, ky, kz, sign, sx, sy, px, py, pz)
+
+
+@njit(cache=True, nogil=True)
+def is_below_in_the_way(
+    code, ox, oy, oz, slopes, shear, end, corners, children, child_boxes, stack
+):  # fmt: skip
+    """Whether any triangle below the node or leaf ``code`` is hit at ``end`` or before."""
+    ix, iy, iz = slopes
+    kx, ky, kz, sign, sx, sy, px, py, pz = shear
+    # Without signs, or every index would be asked whether it counts from the end
+    other, one, two = np.uint64(6), np.uint64(1), np.uint64(2)
+    x, far_x = np.uint64(3 * (ix < 0.0)), np.uint64(3 * (ix >= 0.0))
+    y, far_y = np.uint64(3 * (iy < 0.0)) + one, np.uint64(3 * (iy >= 0.0)) + one
+    z, far_z = np.uint64(3 * (iz < 0.0)) + two, np.uint64(3 * (iz >= 0.0)) + two
+    n_stack = 0
     while True:
         if code >= 0:
-            near, far = children[code, 0], children[code, 1]
-            near_t = _entry(child_boxes, code, 0, ox, oy, oz, ix, iy, iz)
-            far_t = _entry(child_boxes, code, 6, ox, oy, oz, ix, iy, iz)
+            node = np.uint64(code)
+            near, far = children[node, 0], children[node, 1]
+            near_t = _entry_at(
+                *(child_boxes, node, x, y, z, far_x, far_y, far_z, ox, oy, oz, ix, iy, iz)
+            )
+            far_t = _entry_at(
+                *(child_boxes, node, x + other, y + other, z + other),
+                *(far_x + other, far_y + other, far_z + other, ox, oy, oz, ix, iy, iz),
+            )
             if far_t < near_t:
                 near, far = far, near
                 near_t, far_t = far_t, near_t
@@ -178,8 +228,8 @@ def is_in_the_way(
                 code = near
                 continue
         else:
-            first = (-2 - code) >> 3
-            for s in range(first, first + ((-2 - code) & 7) + 1):
+            first = np.uint64((-2 - code) >> 3)
+            for s in range(first, first + np.uint64(((-2 - code) & 7) + 1)):
                 t, _, _ = _hit(corners, s, kx, ky, kz, sign, sx, sy, px, py, pz)
                 if t >= 0.0 and t <= end:
                     return True
@@ -198,7 +248,10 @@ def blocked_rays(
     stack = np.empty(STACK_SIZE, np.int32)
     for q in range(begin, end):
         ox, oy, oz = origins[q, 0] - center[0], origins[q, 1] - center[1], origins[q, 2] - center[2]
-        blocked[q] = is_in_the_way(
-            *(ox, oy, oz, directions[q, 0], directions[q, 1], directions[q, 2], longest[q]),
+        slopes, length, shear = prepared(
+            ox, oy, oz, directions[q, 0], directions[q, 1], directions[q, 2]
+        )
+        blocked[q] = is_below_in_the_way(
+            *(np.int32(0), ox, oy, oz, slopes, shear, longest[q] / length),
             *(corners, children, child_boxes, stack),
         )

@@ -72,19 +72,24 @@ def _dot(normals, face, pole, sheet):
 @njit(cache=True, nogil=True)
 def _poles(normals, faces, start, stop, pole):
     """Two opposed normals, each the mean of those nearer to it; False if none look apart."""
-    for axis in range(3):
-        pole[0, axis] = normals[faces[start], axis]
-    for turn in range(2):
-        least, away = 2.0, start
-        for s in range(start, stop):
-            d = _dot(normals, faces[s], pole, 0)
-            if d < least:
-                least, away = d, s
-        if turn == 1 and least >= 0.0:
-            return False
-        for axis in range(3):
-            pole[1, axis] = pole[0, axis]
-            pole[0, axis] = normals[faces[away], axis]
+    if _within_cone(normals, faces, start, stop, pole):
+        return False
+    first = second = faces[start]
+    apart = 0.0
+    # The faces furthest along 26 directions: of two that are opposed, one is near to some of these
+    for direction in range(27):
+        pole[0, 0] = direction // 9 - 1
+        pole[0, 1] = direction // 3 % 3 - 1
+        pole[0, 2] = direction % 3 - 1
+        along = _extreme(normals, faces, start, stop, pole, 1.0)
+        pole[0] = normals[along]
+        away = _extreme(normals, faces, start, stop, pole, -1.0)
+        d = _dot(normals, away, pole, 0)
+        if d < apart:
+            first, second, apart = along, away, d
+    if apart >= 0.0:
+        return False
+    pole[0], pole[1] = normals[first], normals[second]
     total = np.zeros((2, 3))
     for s in range(start, stop):
         sheet = 1 if _dot(normals, faces[s], pole, 1) > _dot(normals, faces[s], pole, 0) else 0
@@ -96,6 +101,31 @@ def _poles(normals, faces, start, stop, pole):
             for axis in range(3):
                 pole[sheet, axis] = total[sheet, axis] / length
     return True
+
+
+@njit(cache=True, nogil=True)
+def _within_cone(normals, faces, start, stop, pole):
+    """Whether all normals are within 45 degrees of their mean: no two are opposed then."""
+    pole[0] = 0.0
+    for s in range(start, stop):
+        for axis in range(3):
+            pole[0, axis] += normals[faces[s], axis]
+    length = math.sqrt(pole[0, 0] ** 2 + pole[0, 1] ** 2 + pole[0, 2] ** 2)
+    least = 4.0
+    for s in range(start, stop):
+        least = min(least, _dot(normals, faces[s], pole, 0))
+    return least > 0.7072 * length
+
+
+@njit(cache=True, nogil=True)
+def _extreme(normals, faces, start, stop, pole, sign):
+    """The first face whose normal is furthest along (sign 1) or against (-1) ``pole[0]``."""
+    found, most = faces[start], -4.0
+    for s in range(start, stop):
+        d = sign * _dot(normals, faces[s], pole, 0)
+        if d > most:
+            found, most = faces[s], d
+    return found
 
 
 @njit(cache=True, nogil=True)

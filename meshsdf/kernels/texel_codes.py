@@ -20,7 +20,7 @@ SRGB8, LINEAR8, VALUE8, HALF1, HALF4, NORMAL = range(6)
 LINEAR = linear_from_srgb(np.arange(256) / 255.0).astype(np.float32)
 # Linear values from which on the next code is nearer in sRGB
 STEPS = linear_from_srgb((np.arange(255) + 0.5) / 255.0).astype(np.float32)
-# The codes at the beginnings of equal parts of [0, 1): in none are there more than two steps
+# The codes at the beginnings of equal parts of [0, 1), none of which holds more than one step
 PARTS = np.float32(4096.0)
 FIRST_CODE = np.searchsorted(STEPS, np.arange(4096) / 4096.0, side="right").astype(np.uint8)
 HALF_SCALE = np.ldexp(np.float32(1.0), np.maximum(np.arange(32), 1) - 25).astype(np.float32)

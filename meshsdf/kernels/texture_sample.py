@@ -52,7 +52,7 @@ def _gather(
     """
     every_normal, every_footprint = int(len(normals) > 1), int(len(footprints) > 1)
     count = 0
-    while at < end and count < BLOCK:
+    while at < end and count < len(targets):
         n = at
         at += 1
         x, y, z = points[n, 0] * scale, points[n, 1] * scale, points[n, 2] * scale

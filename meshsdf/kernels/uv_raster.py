@@ -15,7 +15,8 @@ def draw_faces(uv, faces, height, width, margin, face_of, places):
     Coordinates (n, 2) are in texels, rows counted downwards: texel (row, column) has its centre at
     (column + 1/2, row + 1/2). ``places`` (h, w, 2) float32 are the weights of the face's second and
     third corner there; beyond the face's edge they continue its plane. Of texels beside faces the
-    nearest face takes each; ``face_of`` (h, w) is NO_FACE where there is none.
+    nearest face takes each; ``face_of`` (h, w) is NO_FACE where there is none. The picture repeats:
+    what leaves it on one side enters on the other. Faces wider than the picture are left out.
     """
     gap = np.full((height, width), np.float32(np.inf))
     for f in range(len(faces)):
@@ -27,17 +28,12 @@ def draw_faces(uv, faces, height, width, margin, face_of, places):
             continue
         low_x, high_x = min(0.0, ux, vx) + ax, max(0.0, ux, vx) + ax
         low_y, high_y = min(0.0, uy, vy) + ay, max(0.0, uy, vy) + ay
-        if high_x < -margin or high_y < -margin:
+        if high_x - low_x > width or high_y - low_y > height:
             continue
-        if low_x > width + margin or low_y > height + margin:
-            continue
-        for row in range(
-            max(0, math.floor(low_y - margin)), min(height, math.ceil(high_y + margin) + 1)
-        ):
-            for column in range(
-                max(0, math.floor(low_x - margin)), min(width, math.ceil(high_x + margin) + 1)
-            ):
-                px, py = column + 0.5 - ax, row + 0.5 - ay
+        for y in range(math.floor(low_y - margin), math.ceil(high_y + margin) + 1):
+            for x in range(math.floor(low_x - margin), math.ceil(high_x + margin) + 1):
+                row, column = y % height, x % width
+                px, py = x + 0.5 - ax, y + 0.5 - ay
                 s, t = (px * vy - py * vx) / cross, (ux * py - uy * px) / cross
                 away = 0.0
                 if s < 0.0 or t < 0.0 or s + t > 1.0:

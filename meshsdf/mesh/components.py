@@ -7,7 +7,6 @@ from jaxtyping import Bool, Int32
 
 from ..arrays import FaceLabels, Faces, Indices, Points
 from ..box import Box
-from ..kernels.component_measures import measure_components
 from ..kernels.edges import join_corners, join_faces, join_forests, number_components
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from .edge_chain import ResidualLines
@@ -86,6 +85,8 @@ def describe_components(
     points: Points, faces: Faces, table: EdgeTable, lines: ResidualLines | None
 ) -> tuple[Component, ...]:
     """Measure every component of faces that name welded vertices."""
+    from ..kernels.component_measures import measure_components  # only `check` waits for it
+
     labels, c = component_labels(table, lines)
     if c == 0:
         return ()

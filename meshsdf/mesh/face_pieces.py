@@ -7,7 +7,6 @@ from jaxtyping import Bool, Float64, Int32, Int64
 
 from ..arrays import Faces, Number
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
-from ..kernels.sheet_cuts import cut_faces
 from ..progress import Progress, silent
 from .face_tree import FaceTree
 from .meetings import PIECES_PER_THREAD, Meetings
@@ -77,6 +76,8 @@ def cut_met_faces(
     near : float
         In normalised coordinates: lengths that count as nothing.
     """
+    from ..kernels.sheet_cuts import cut_faces  # most meshes never come here
+
     ids = np.flatnonzero(meetings.is_met).astype(np.int32)
     start = np.append(meetings.start[ids], meetings.start[-1])
     ranges = even_ranges(len(ids), PIECES_PER_THREAD * n_threads())

@@ -7,7 +7,6 @@ from jaxtyping import Bool, Int32, Int64
 
 from ..arrays import Number
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
-from ..kernels.sheet_pairs import COPLANAR, list_meetings
 from ..progress import Progress, silent
 from .face_tree import FaceTree
 
@@ -37,6 +36,8 @@ class Meetings:
 
     def coplanar(self) -> tuple[Int64[np.ndarray, " m1"], Int32[np.ndarray, " c"]]:
         """Start (m + 1,) and ascending lists of the faces with which each is coplanar."""
+        from ..kernels.sheet_pairs import COPLANAR
+
         is_flat = self.partners[:, 1] == COPLANAR
         before = np.concatenate([np.zeros(1, np.int64), np.cumsum(is_flat)])
         return before[self.start], self.partners[is_flat, 0].copy()
@@ -57,6 +58,8 @@ def find_meetings(tree: FaceTree, near: Number, progress: Progress = silent) -> 
     Accuracy: no pair that meets is missing.
     Cost: O(m log m) plus the pairs whose boxes overlap.
     """
+    from ..kernels.sheet_pairs import list_meetings  # pictures, say, need not wait for it
+
     m = len(tree.faces)
     ranges = even_ranges(m, PIECES_PER_THREAD * n_threads())
     found = [np.empty((0, 3), np.int32)] * len(ranges)

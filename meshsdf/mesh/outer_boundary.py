@@ -20,7 +20,6 @@ from jaxtyping import Bool, Float64, Int32
 
 from ..arrays import FaceLabels, FaceMask, Faces, Points
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
-from ..kernels.sheet_sides import wind_sheets
 from ..progress import Progress, silent
 from .edge_chain import residual_edge_lines
 from .edge_table import EdgeTable, edge_table
@@ -190,6 +189,8 @@ class _Judge:
 
     def _along(self, axis: int, owners: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Judge by the lines along an axis."""
+        from ..kernels.sheet_sides import wind_sheets  # most meshes never come here
+
         tree = self.tree.turned(axis)
         edge_line, line_ends = self.lines
         edge_line = edge_line[tree.order] if len(edge_line) else edge_line

@@ -16,7 +16,6 @@ import numpy as np
 from ..arrays import Faces, Points, Vector3
 from ..box import Box
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
-from ..kernels.triangle_pairs import LEAF, count_crossing_pairs, fill_boxes
 from ..progress import Progress, silent
 
 PIECES_PER_THREAD = 16  # enough for progress and an even load
@@ -59,6 +58,8 @@ def find_self_intersections(
     -----
     Cost: O(m log m) plus the pairs whose boxes overlap.
     """
+    from ..kernels.triangle_pairs import LEAF, count_crossing_pairs, fill_boxes
+
     if len(faces) == 0:
         return SelfIntersections(0, None, None)
     order = np.argsort(_morton_codes(points, faces), kind="stable")

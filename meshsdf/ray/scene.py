@@ -90,12 +90,20 @@ class Scene:
 
     def __init__(self, mesh: Mesh, *, smooth: bool | None = None) -> None:
         self.mesh = mesh
-        self.rays = RayHits(mesh)
-        self.face_normals = face_normals(mesh)
-        is_smooth = is_fine(mesh) if smooth is None else smooth
+        # Building the tree takes one core as long as the normals take the other
+        steps = [self._prepare_rays, lambda: self._prepare_normals(smooth)]
+        run_pieces(lambda piece: steps[piece](), len(steps))
+
+    def _prepare_rays(self) -> None:
+        self.rays = RayHits(self.mesh)
+        self.homes, self.parents = self.rays.homes_and_parents()
+
+    def _prepare_normals(self, smooth: bool | None) -> None:
+        self.face_normals = face_normals(self.mesh)
+        is_smooth = is_fine(self.mesh) if smooth is None else smooth
         self.corner_normals = None
         if is_smooth:
-            self.corner_normals = smooth_normals(mesh, of_faces=self.face_normals)
+            self.corner_normals = smooth_normals(self.mesh, of_faces=self.face_normals)
 
     def look(
         self,
@@ -183,9 +191,9 @@ class Scene:
         light: Float64[np.ndarray, "9"],
     ) -> None:
         sky_sums(
-            *(seen.point, seen.normal, seen.facet, seen.lift, sets, begin, end),
-            *(self.rays.center, LONGEST * 2.0 * self.rays.radius, directions, light),
-            *(self.rays.corners, *self.rays.tree, seen.sums),
+            *(seen.point, seen.normal, seen.facet, seen.lift, sets, self.homes[seen.face]),
+            *(begin, end, self.rays.center, LONGEST * 2.0 * self.rays.radius, directions, light),
+            *(self.rays.corners, *self.rays.tree, self.parents, seen.sums),
         )
 
 

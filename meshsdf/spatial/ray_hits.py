@@ -6,12 +6,12 @@ Prepare once, ask often: ``RayHits(mesh)(origins, directions)``. The work is in 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool, Float64, Int32
 
 from ..arrays import Barycentrics, Indices, Number, Points, Values, writable_alias
 from ..box import Box
 from ..errors import SpatialError
-from ..kernels.bvh import PAD, build_tree, triangle_boxes
+from ..kernels.bvh import EMPTY, PAD, build_tree, triangle_boxes
 from ..kernels.mesh_rays import blocked_rays, nearest_hits
 from ..kernels.parallel import even_ranges, run_pieces
 from ..mesh import Mesh
@@ -19,6 +19,7 @@ from ..progress import Progress, silent
 
 Directions = Float64[np.ndarray, "d 3"]
 Lengths = Float64[np.ndarray, " lengths"]
+Parents = Int32[np.ndarray, " nodes"]
 
 RAYS_PER_PIECE = 16384  # some 10 ms: often enough for progress and Ctrl-C
 LARGEST = 1e30  # of a coordinate, world units
@@ -184,6 +185,19 @@ class RayHits:
 
         run_pieces(work, len(pieces))
         return blocked
+
+    def homes_and_parents(self) -> tuple[Indices, Parents]:
+        """Return which child, 2 * node + side, holds each face, and which one each node is."""
+        codes = self.tree[0].ravel()
+        places = np.arange(len(codes), dtype=np.int32)
+        parents = np.full(len(codes) // 2, -1, np.int32)
+        parents[codes[codes >= 0]] = places[codes >= 0]
+        leaves = places[codes < EMPTY]
+        firsts, counts = np.divmod(-2 - codes[leaves], 8)
+        by_slot = np.argsort(firsts)
+        homes = np.empty(self.mesh.n_faces, np.int32)
+        homes[self.face_of_slot] = np.repeat(leaves[by_slot], counts[by_slot] + 1)
+        return homes, parents
 
     def _search(
         self, origins: Points, directions: Directions, begin: int, end: int, hits: Hits

@@ -31,7 +31,7 @@ PER_PART = 1 << 20
 # Interpolation and mipmap at spacing h average over 2 h: (2 h^2) / 6 is the variance of both
 SHARE = 0.5
 PROBE = 1024  # texels a side of the picture that tells whether faces cover each other
-BEYOND = 1e-6
+FARTHEST = 1e6
 MOST_COVERED = 0.97
 WHERE = "atlas_for(mesh, size, method)"
 
@@ -192,9 +192,9 @@ def _in_texels(uv: Points2, size: int) -> Points2:
 
 
 def _is_one_to_one(mesh: Mesh) -> bool:
-    """Coordinates lie in the unit square, and faces hardly cover each other there."""
+    """Faces hardly cover each other on the picture, which repeats."""
     used = mesh.uv[mesh.faces]
-    if not (used.min() >= -BEYOND and used.max() <= 1 + BEYOND):
+    if not np.abs(used).max() < FARTHEST:
         return False
     face_of = np.full((PROBE, PROBE), NO_FACE, np.int32)
     draw_faces(

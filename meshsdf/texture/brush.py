@@ -215,7 +215,7 @@ class Brush:
             what = f"this describes no brush: {error}"
             raise TextureError(what, "Brush.from_dict", "pass what to_dict returned") from None
 
-    def _check_range(self, name: str, value: Number, least: float, most: float) -> None:
+    def _check_range(self, name: str, value: Number, least: Number, most: Number) -> None:
         if not least <= value <= most:
             raise TextureError(
                 f"a brush's {name} cannot be {value}",
@@ -239,10 +239,12 @@ class Brush:
 
 
 def _check_picture(picture: np.ndarray, where: str) -> None:
-    fits = picture.ndim == 2 and 0 < min(picture.shape) and max(picture.shape) <= MOST_PIXELS
+    fits = picture.ndim == 2 and min(picture.shape) > 0 and max(picture.shape) <= MOST_PIXELS
     if not fits or not ((picture >= 0) & (picture <= 1)).all():
         what = f"a picture of shape {picture.shape} has pixels beyond 0 and 1, or too many, or none"
-        raise TextureError(what, where, f"give (h, w) numbers in [0, 1], {MOST_PIXELS} a side at most")
+        raise TextureError(
+            what, where, f"give (h, w) numbers in [0, 1], {MOST_PIXELS} a side at most"
+        )
 
 
 def _packed(picture: np.ndarray) -> dict[str, Any]:

@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Bool, Int32, Int64
 
 from ..errors import TextureError
-from ..kernels.composite import changed_nodes, mark_dependents
+from ..kernels.composite import changed_nodes, layer_values, mark_dependents
 from ..kernels.parallel import even_ranges, run_pieces
-from ..kernels.texture_lookup import ABSENT
+from ..kernels.texture_lookup import ABSENT, FIRST_TILE
 from .compositing import BLEND_MODES, check_layers, compose
 from .layer import Layer
-from .mip import update_mips
+from .mip import update_mips, used_channels
 from .octree import Entries
 from .procedural_layer import ProceduralLayer, fill
 from .refine import family_of
@@ -244,7 +244,7 @@ def _changes(texture: VolumeTexture, before: np.ndarray, after: np.ndarray) -> C
     old, new = before[entries], after[entries]
     boxes = np.tile(NO_BOX, (len(entries), 1))
     either = (old == ABSENT) | (new == ABSENT)
-    boxes[either] = ALL_NODES
+    boxes[either & ~_equal_tiles(texture, before, after, entries)] = ALL_NODES
     both = np.flatnonzero(~either)
     some = np.tile(NO_BOX, (len(both), 1))
     for name, pool in texture.pool.arrays.items():
@@ -270,6 +270,35 @@ def _evaluate_all(texture: VolumeTexture, layers: Sequence[Layer]) -> None:
     for layer in layers:
         if isinstance(layer, ProceduralLayer) and layer.function is not None:
             fill(texture, layer, everything)
+
+
+def _equal_tiles(texture: VolumeTexture, before, after, entries: Entries) -> Marks:
+    """Entries that are tiles in one of two arrays of slots and show just that in the other.
+
+    Every cell of the level above has its middle among the texels of the level, so a layer that
+    shows one colour at all texels of a brick that it does not store shows it in between, too.
+    """
+    same = np.zeros(len(entries), bool)
+    for tile, other in ((before, after), (after, before)):
+        rows = np.flatnonzero((tile[entries] <= FIRST_TILE) & (other[entries] == ABSENT))
+        if len(rows):
+            same[rows] = _shows_tiles(texture, other, entries[rows], tile[entries[rows]])
+    return same
+
+
+def _shows_tiles(texture: VolumeTexture, slots, entries: Entries, codes) -> Marks:
+    """Whether each entry shows nothing but its tile, in every channel."""
+    tables = texture.octree.tables
+    first = np.concatenate([[0], np.cumsum(np.diff(tables.texel_first)[entries])])
+    same = np.ones(len(entries), bool)
+    for name in used_channels(texture):
+        channel, tiles = texture.channels[name], texture.tiles.arrays[name]
+        seen = np.empty((first[-1], 4), np.float32)
+        pool = texture.pool.use(name)
+        layer_values(tables, slots, pool, tiles, channel.kind, entries, first, seen)
+        tile = np.repeat(channel.decoded(tiles[FIRST_TILE - codes]), np.diff(first), axis=0)
+        same &= np.logical_and.reduceat((seen == tile).all(axis=1), first[:-1])
+    return same
 
 
 def _visible(texture: VolumeTexture) -> list[Layer]:

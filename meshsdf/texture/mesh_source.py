@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float64
 
-from ..arrays import Number, Points, Values
+from ..arrays import Barycentrics, Indices, Number, Points, Values
 from ..mesh import Mesh
 from ..spatial import ClosestPoint
 from .channels import Numbers
@@ -41,21 +41,30 @@ class MeshSource:
         footprint: Number | Values = 0.0,
     ) -> Numbers:
         """(n, 4) linear RGB and alpha, averaged over the footprint (world units)."""
+        return self.colors(*self.places(points, normals, footprint), footprint)
+
+    def places(
+        self,
+        points: Points,
+        normals: Float64[np.ndarray, "n 3"] | None = None,
+        step: Number | Values = 0.0,
+    ) -> tuple[Indices, Barycentrics]:
+        """The faces that answer, and where on them; steps off the wrong side are in world units."""
         found = self._closest(points)
         face, barycentric = found.face_index.copy(), found.barycentric.copy()
         if normals is not None:
-            width = np.broadcast_to(np.asarray(footprint, np.float64), len(points))
+            width = np.broadcast_to(np.asarray(step, np.float64), len(points))
             wrong = np.flatnonzero(self._looks_away(face, normals))
-            for step in STEPS:
+            for factor in STEPS:
                 if len(wrong) == 0:
                     break
-                moved = points[wrong] + step * width[wrong, None] * normals[wrong]
+                moved = points[wrong] + factor * width[wrong, None] * normals[wrong]
                 other = self._closest(moved)
                 right = ~self._looks_away(other.face_index, normals[wrong])
                 face[wrong[right]] = other.face_index[right]
                 barycentric[wrong[right]] = other.barycentric[right]
                 wrong = wrong[~right]
-        return self.colors(face, barycentric, footprint)
+        return face, barycentric
 
     def _looks_away(self, face: np.ndarray, normals: np.ndarray) -> np.ndarray:
         return np.einsum("nk,nk->n", self._cross[face], normals) < 0

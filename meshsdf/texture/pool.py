@@ -38,7 +38,7 @@ class BrickPool:
         self.born = np.zeros(FIRST_CAPACITY, np.int64)
         self.generation = 0
         self._recordings: list[int] = []  # generations that began them, outermost first
-        self._waiting: list[int] = []  # slots that none needs, but that recordings may ask for
+        self._waiting: set[int] = set()  # slots that none needs, but that recordings may ask for
         self.arrays: dict[str, np.ndarray] = {}
         self._free: list[int] = list(range(FIRST_CAPACITY - 1, -1, -1))
         self.use("base")
@@ -72,14 +72,18 @@ class BrickPool:
 
     def take(self, n: int) -> Slots:
         """Return n free slots, held once, in which nothing was ever written."""
-        while len(self._free) < n:
-            self._grow()
+        self.reserve(n)
         slots = np.array([self._free.pop() for _ in range(n)], np.int32)
         self.holders[slots] = 1
         self.born[slots] = self.generation
         for name, array in self.arrays.items():
             array[slots] = self.channels[name].nothing
         return slots
+
+    def reserve(self, n: int) -> None:
+        """Make room for n slots, growing at most once."""
+        if len(self._free) < n:
+            self._grow(n - len(self._free))
 
     def copies(self, slots: Slots) -> Slots:
         """Return new slots, held once, with the texels of others."""
@@ -102,8 +106,10 @@ class BrickPool:
         unique = np.unique(dropped)
         unneeded = unique[self.holders[unique] == 0][::-1]
         known = self._is_known(unneeded)
-        self._waiting.extend(unneeded[known].tolist())
-        self._free.extend(unneeded[~known].tolist())
+        free = unneeded[~known].tolist()
+        self._waiting.update(unneeded[known].tolist())
+        self._waiting.difference_update(free)  # known to a recording within one that is not over
+        self._free.extend(free)
 
     def is_shared(self, slots: Slots) -> np.ndarray:
         """Whether others hold the slots, too, or the texels are from before a recording."""
@@ -118,25 +124,28 @@ class BrickPool:
         """End the latest recording; what it wants to keep must be held by now."""
         self._recordings.pop()
         if not self._recordings:
-            waiting = np.unique(np.array(self._waiting, np.int64))
-            self._free.extend(waiting[self.holders[waiting] == 0][::-1].tolist())
-            self._waiting = []
+            waiting = np.array(sorted(self._waiting, reverse=True), np.int64)
+            self._free.extend(waiting[self.holders[waiting] == 0].tolist())
+            self._waiting = set()
 
     def _is_known(self, slots: Slots) -> np.ndarray:
         if not self._recordings:
             return np.zeros(len(slots), bool)
         return self.born[slots] < self._recordings[-1]
 
-    def _grow(self) -> None:
+    def _grow(self, least: int) -> None:
         before = len(self.holders)
-        self.holders = np.concatenate([self.holders, np.zeros(before, np.int32)])
-        self.born = np.concatenate([self.born, np.zeros(before, np.int64)])
+        more = before
+        while more < least:
+            more = 2 * more + before  # capacities are powers of two times the first
+        self.holders = np.concatenate([self.holders, np.zeros(more, np.int32)])
+        self.born = np.concatenate([self.born, np.zeros(more, np.int64)])
         for name, array in self.arrays.items():
             # New pages of memory are taken only when they are written
-            grown = np.empty((2 * before, TEXELS), array.dtype)
+            grown = np.empty((before + more, TEXELS), array.dtype)
             grown[:before] = array
             self.arrays[name] = grown
-        self._free = list(range(2 * before - 1, before - 1, -1)) + self._free
+        self._free = list(range(before + more - 1, before - 1, -1)) + self._free
 
 
 class TilePool:

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Points, Values
+from ..arrays import Points
 from ..kernels.texture_lookup import ABSENT
 from .layer import Layer
+from .lookup import Footprint
 from .mip import evaluated
 from .octree import Entries
 from .refine import refine
@@ -75,10 +76,14 @@ def add_procedural(
     layer = texture.add_layer(name)
     texture.layers.remove(layer)
     filled = ProceduralLayer(layer.number, layer.name, layer.slots, function=function)
-    top = np.arange(*texture.octree.level_first[-2:], dtype=np.int32)
-    _evaluate(texture, filled, top)
+    restart(texture, filled)
     texture.layers.append(filled)
     return filled
+
+
+def restart(texture: VolumeTexture, layer: ProceduralLayer) -> None:
+    """Store the coarsest level of a layer that stores nothing yet."""
+    _evaluate(texture, layer, np.arange(*texture.octree.level_first[-2:], dtype=np.int32))
 
 
 def fill(texture: VolumeTexture, layer: ProceduralLayer, entries: Entries) -> None:
@@ -93,12 +98,12 @@ def fill_seen(
     layer: ProceduralLayer,
     points: Points,
     normals: Normals | None,
-    widths: Values,
+    footprint: Footprint = 0.0,
 ) -> None:
-    """Evaluate what looking at points with footprints (n,) or (1,), world units, needs."""
+    """Evaluate what `VolumeTexture.colors` needs to show points."""
     spacing, top = texture.octree.texel, texture.octree.n_levels - 1
     known = (np.abs(points) < FARTHEST * spacing).all(axis=1)
-    levels = np.floor(np.log2(np.fmax(np.broadcast_to(widths, len(points)) / spacing, 1.0)))
+    levels = np.floor(np.log2(np.fmax(np.broadcast_to(footprint, len(points)) / spacing, 1.0)))
     levels = np.where(known, np.minimum(levels, top), -1).astype(np.int64)
     directions = np.zeros_like(points) if normals is None else normals
     wanted = [np.empty(0, np.int32)]

@@ -9,6 +9,7 @@ from .change import recording
 from .checkpoint import Loaded, install, load_checkpoint
 from .history import History
 from .journal_log import read_operation
+from .journal_schema import FAULTS
 from .operations import perform
 
 
@@ -102,6 +103,6 @@ class Replay:
             operation = read_operation(self.connection, number)
             with recording(self.texture) as change:
                 perform(self.texture, operation)
-        except (MeshsdfError, sqlite3.Error) as error:
+        except (MeshsdfError, *FAULTS) as error:
             raise Damaged(f"operation {number} cannot be done again: {error}") from None
         self.history.keep(index, change)

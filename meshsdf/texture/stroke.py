@@ -7,14 +7,18 @@ from jaxtyping import Float64
 
 from ..arrays import Points, Values
 from ..errors import TextureError
-from ..kernels.brush import COPY, ERASE, PAINT, lay
 from ..kernels.blending import MODES
+from ..kernels.brush import COPY, ERASE, PAINT, lay
+from ..kernels.brush_filters import blurred, replace, smudged
 from ..kernels.stroke_path import SAMPLE, STATE, make_dabs
 from .brush import Brush
+from .clone_source import CloneSource
 from .layer import Layer
 from .mip import update_mips
 from .octree import Entries
+from .region import fill, gradient
 from .stroke_cover import Cover, Touched, run_ranges
+from .stroke_record import StrokeRecord
 from .volume_texture import VolumeTexture
 
 Normals = Float64[np.ndarray, "n 3"]
@@ -22,6 +26,8 @@ Normals = Float64[np.ndarray, "n 3"]
 MOST_DABS = 100_000  # of one batch of samples, copies included
 FARTHEST = 2.0**40  # finest texels from the origin
 SHARP_CORNER = np.sqrt(2.0)  # a stamp's corners are so many half sides from its middle
+NO_SOURCE = np.zeros((1, 1, 4), np.float32)
+REGIONS = ("fill", "gradient")
 WHERE = "Stroke.add(points, normals, pressures)"
 
 
@@ -56,11 +62,14 @@ class Stroke:
         self.texture, self.layer, self.brush = texture, layer, brush
         self._matrices = brush.symmetry.matrices()
         self._center = np.array(brush.symmetry.center, np.float64) / texture.octree.texel
-        self._cover = Cover(texture, layer, brush)
         self._state = np.zeros(STATE)
-        self._color, self._source = _paint_of(brush), np.zeros((1, 1, 4), np.float32)
+        self._color = paint_of(brush)
         self._ended = False
+        self._parts: list[tuple[Points, Normals, Values]] = []
         texture.pool.use(brush.channel)
+        if brush.kind not in REGIONS:
+            self._cover = Cover(texture, layer, brush)
+        self._clone = CloneSource(texture, layer, brush) if brush.kind == "clone" else None
 
     def __enter__(self) -> "Stroke":
         return self
@@ -69,8 +78,17 @@ class Stroke:
         if not self._ended:
             self.cancel() if kind else self.end()
 
+    @property
+    def record(self) -> StrokeRecord:
+        """All that was added so far, so that it can be painted again."""
+        empty = np.empty((0, 3)), np.empty((0, 3)), np.empty(0)
+        points, normals, pressures = (
+            np.concatenate(arrays) for arrays in zip(empty, *self._parts, strict=True)
+        )
+        return StrokeRecord(self.brush, points, normals, pressures, self.layer.number)
+
     def add(self, points: Points, normals: Normals, pressures: Values | None = None) -> None:
-        """Go on to more points, and paint on the way there.
+        """Go on to more points, and paint on the way there; regions are painted at the end.
 
         Parameters
         ----------
@@ -85,13 +103,18 @@ class Stroke:
         ------
         TextureError
             Numbers are not finite or out of range, or the way is absurdly long; nothing of the
-            batch is painted. The stroke has ended.
+            batch is painted, and the stroke may go on. Or the stroke has ended.
         """
         if self._ended:
             raise TextureError("the stroke has ended", WHERE, "begin another stroke")
-        dabs = self._dabs(self._samples(points, normals, pressures))
-        if len(dabs):
-            self._paint(self._cover.add(dabs, len(self._matrices)))
+        pressures = np.ones(len(points)) if pressures is None else pressures
+        samples = self._samples(points, normals, pressures)
+        dabs = self._dabs(samples)
+        self._parts.append((points.copy(), normals.copy(), pressures.copy()))
+        if self.brush.kind in ("blur", "smudge"):
+            self._filter(dabs)
+        elif len(dabs) and self.brush.kind not in REGIONS:
+            self._lay(self._cover.add(dabs, len(self._matrices)))
 
     def end(self) -> Entries:
         """End the stroke, and bring coarser levels up to date.
@@ -100,20 +123,42 @@ class Stroke:
         -------
         entries : (k,) int32
             All that changed, of all levels, in rising order; none if the stroke changed nothing.
+
+        Raises
+        ------
+        TextureError
+            A gradient's two points are one.
         """
         self._ended = True
-        changed = self._cover.finish(self.brush.channel)
+        if self.brush.kind in REGIONS:
+            changed = self._paint_region()
+        else:
+            changed = self._cover.finish(self.brush.channel)
         above = update_mips(self.texture, self.layer, changed)
         return np.union1d(changed, above).astype(np.int32)
 
     def cancel(self) -> None:
         """End the stroke as if it had never painted."""
         self._ended = True
-        self._cover.cancel()
+        if self.brush.kind not in REGIONS:
+            self._cover.cancel()
 
-    def _samples(self, points: Points, normals: Normals, pressures: Values | None) -> np.ndarray:
+    def _paint_region(self) -> Entries:
+        """Fill from the first point and its copies, or paint from the first point to the last."""
+        record, texel = self.record, self.texture.octree.texel
+        if len(record.points) == 0:
+            return np.empty(0, np.int32)
+        if self.brush.kind == "gradient":
+            ends = record.points[0], record.points[-1]
+            return gradient(self.texture, self.layer, self.brush, *ends)
+        self._state[:] = 0
+        ones = np.ones(1)
+        seeds = self._dabs(self._samples(record.points[:1], record.normals[:1], ones))
+        points, normals = seeds[:, :3] * texel, np.ascontiguousarray(seeds[:, 10:13])
+        return fill(self.texture, self.layer, self.brush, points, normals)
+
+    def _samples(self, points: Points, normals: Normals, pressures: Values) -> np.ndarray:
         """(n, 8) checked samples, as `kernels.stroke_path` takes them."""
-        pressures = np.ones(len(points)) if pressures is None else pressures
         if not len(points) == len(normals) == len(pressures):
             what = f"{len(points)} points, {len(normals)} normals, {len(pressures)} pressures"
             raise TextureError(what, WHERE, "give as many of each")
@@ -153,7 +198,7 @@ class Stroke:
         make_dabs(samples, self._state, *how, dabs)
         return dabs
 
-    def _paint(self, touched: Touched) -> None:
+    def _lay(self, touched: Touched) -> None:
         """Lay the paint on texels whose coverage changed."""
         texture, brush, cover = self.texture, self.brush, self._cover
         channel = texture.channels[brush.channel]
@@ -161,15 +206,40 @@ class Stroke:
         pool, tiles = texture.pool.use(channel.name), texture.tiles.arrays[channel.name]
         mode = MODES.index(brush.blend)
         opacity, nothing = np.float32(brush.opacity), channel.dtype.type(channel.nothing)
+        source = self._clone.of(touched) if self._clone else NO_SOURCE
 
         def work(begin: int, end: int) -> None:
             lay(
                 touched.entries, begin, end, touched.rows, touched.changed, cover.base,
-                self.layer.slots, cover.coverage, self._source, action, channel.kind, mode,
-                self._color, opacity, nothing, pool, tiles,
+                self.layer.slots, cover.coverage, source, action, channel.kind, mode, self._color,
+                opacity, nothing, pool, tiles,
             )  # fmt: skip
 
         run_ranges(work, len(touched.entries), 50)
+
+    def _filter(self, dabs: np.ndarray) -> None:
+        """Blur or smudge with dabs, one after another: each works on what the last one left."""
+        brush, cover, tables = self.brush, self._cover, self.texture.octree.tables
+        channel = self.texture.channels[brush.channel]
+        opacity = np.float32(brush.opacity)
+        for dab in dabs[:, None]:
+            touched = cover.add(dab, 1)
+            pool = self.texture.pool.use(channel.name)
+            values = np.empty((len(touched.entries), 512), channel.dtype)
+            rest = (channel.kind, pool, self.texture.tiles.arrays[channel.name], values)
+
+            def work(begin: int, end: int, touched=touched, way=dab[0, 16:], rest=rest) -> None:
+                what = (touched.rows, touched.changed, self.layer.slots, cover.coverage, opacity)
+                if brush.kind == "blur":
+                    blurred(tables, touched.entries, begin, end, *what, *rest)
+                else:
+                    smudged(tables, touched.entries, begin, end, *what, way, *rest)
+
+            run_ranges(work, len(touched.entries), 50)
+            replace(
+                touched.entries, touched.rows, touched.changed, self.layer.slots, values, pool,
+                cover.coverage,
+            )  # fmt: skip
 
 
 def paint(
@@ -190,7 +260,26 @@ def paint(
     return stroke.end()
 
 
-def _paint_of(brush: Brush) -> np.ndarray:
+def replay(texture: VolumeTexture, record: StrokeRecord) -> Entries:
+    """Paint a recorded stroke again, on this or another texture of the same or a like shape.
+
+    Brushes are in world units, so a finer texture shows the same stroke in more detail.
+
+    Raises
+    ------
+    TextureError
+        The texture has no layer of that number.
+    """
+    layers = [layer for layer in texture.layers if layer.number == record.layer]
+    if not layers:
+        numbers = ", ".join(str(layer.number) for layer in texture.layers) or "none"
+        what = f"there is no layer {record.layer}; layers: {numbers}"
+        raise TextureError(what, "replay(record)", "add the layer first")
+    samples = record.points, record.normals, record.pressures
+    return paint(texture, layers[0], record.brush, *samples)
+
+
+def paint_of(brush: Brush) -> np.ndarray:
     """The four numbers that a brush lays on."""
     color = (brush.value, 0.0, 0.0, 1.0) if brush.channel in ("height", "mask") else brush.color
     return np.array(color, np.float32)

@@ -317,8 +317,7 @@ class VolumeTexture:
             if getattr(one, "function", None) is not None and (layer or one.visible):
                 from .procedural_layer import fill_seen  # which imports this module
 
-                widths = np.atleast_1d(np.asarray(footprint, np.float64))
-                fill_seen(self, one, points, normals, widths)
+                fill_seen(self, one, points, normals, footprint)
 
     def _shown(self) -> Layer:
         from .layers import shown  # which imports this module

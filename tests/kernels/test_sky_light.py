@@ -6,24 +6,26 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from meshsdf.kernels.sky_light import mean_sums, sky_sums
 from meshsdf.mesh import Mesh
-from meshsdf.mesh.primitives import box_mesh
+from meshsdf.mesh.measures import face_normals
+from meshsdf.mesh.primitives import box_mesh, icosphere
 from meshsdf.ray.shading import N_SETS, ray_sets
 from meshsdf.spatial.ray_hits import RayHits
 
 EVEN = np.array([1.0, 0, 0, 0, 1, 0, 0, 1, 0])
 
 
-def sums_of(mesh, points, normals, *, n_rays=64, sky=EVEN, longest=np.inf, facets=None):
+def sums_of(mesh, points, normals, *, n_rays=64, sky=EVEN, longest=np.inf, facets=None, homes=None):
     """The sums of all 16 sets together, at (n, 3) points that lie on nothing."""
     rays = RayHits(mesh)
     total = np.zeros((len(points), 2))
     for number in range(N_SETS):
         sums = np.empty((len(points), 2))
         sets, lifts = np.full(len(points), number), np.zeros(len(points))
+        homes = np.zeros(len(points), np.int32) if homes is None else homes
         sky_sums(
             *(points, normals, normals if facets is None else facets, lifts, sets),
-            *(0, len(points), rays.center, longest, ray_sets(n_rays), sky),
-            *(rays.corners, *rays.tree, sums),
+            *(homes, 0, len(points), rays.center, longest, ray_sets(n_rays), sky),
+            *(rays.corners, *rays.tree, rays.homes_and_parents()[1], sums),
         )
         total += sums
     return total
@@ -63,6 +65,47 @@ def test_a_room_without_windows_is_dark_and_the_outside_of_it_is_not():
     outside = 2 * normals
     sums = sums_of(box_mesh(), outside, normals, n_rays=4)
     assert_array_equal(sums[:, 0], sums[:, 1])
+
+
+def test_where_in_the_tree_a_search_starts_changes_nothing():
+    rng = np.random.default_rng(1)
+    mesh = icosphere(subdivisions=3)
+    dents = 1 - 0.3 * rng.random(mesh.n_vertices)
+    mesh = Mesh(mesh.vertices * dents[:, None], mesh.faces)
+    rays, faces, normals = RayHits(mesh), np.arange(mesh.n_faces), face_normals(mesh)
+    points = mesh.triangles.mean(axis=1) + 1e-3 * normals
+    homes, parents = rays.homes_and_parents()
+    assert_array_equal(rays.tree[0].ravel()[parents[1:]], np.arange(1, len(parents)))
+    from_root = sums_of(mesh, points, normals, n_rays=4)
+    assert np.mean(from_root[:, 1] < from_root[:, 0]) > 0.1
+    assert from_root[:, 1].max() > 0
+    for start in (homes, homes[rng.permutation(faces)]):
+        assert_array_equal(sums_of(mesh, points, normals, n_rays=4, homes=start), from_root)
+    # Every ray by itself, from the root
+    directions = ray_sets(4)[:, :, None] @ axes_around(normals)[:, None, None]
+    directions = directions.reshape(len(points), -1, 3)
+    blocked = rays.is_blocked(np.repeat(points, 64, axis=0), directions.reshape(-1, 3))
+    arriving = 64 - blocked.reshape(-1, 64).sum(axis=1)
+    assert_array_equal(from_root, np.column_stack([np.full(len(points), 64), arriving]))
+
+
+def axes_around(normals):
+    """Two axes across each unit normal, and itself, as rows (Duff et al. 2017, JCGT 6(1))."""
+    x, y, z = normals.T
+    side = np.where(z >= 0, 1.0, -1.0)
+    a = -1 / (side + z)
+    b = x * y * a
+    across = np.column_stack([1 + side * x * x * a, side * b, -side * x])
+    return np.stack([across, np.column_stack([b, side + y * y * a, -y]), normals], axis=1)
+
+
+def test_the_homes_of_faces_are_the_leaves_that_hold_them():
+    rays = RayHits(icosphere(subdivisions=2))
+    homes, _ = rays.homes_and_parents()
+    leaf = -2 - rays.tree[0].ravel()[homes]
+    place = np.argsort(rays.face_of_slot) - leaf // 8
+    assert place.min() == 0
+    assert (place <= leaf % 8).all()
 
 
 @pytest.mark.parametrize("n_rays", [1, 4, 64])

@@ -1,0 +1,226 @@
+"""``meshsdf texture apply | export | info``: a texture out to meshes, pictures and volumes."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from .console import YES, Console, file_size
+from .options import PositiveNumber, force_option, json_option, path
+from .texture_make import texture_facts, texture_words
+
+PICTURES = (".png", ".jpg", ".jpeg", ".exr")
+VOLUMES = (".vdb",)
+
+
+def laid_options(function: Callable) -> Callable:
+    """How a mesh is laid out on an image."""
+    for option in reversed(
+        (
+            click.option("--size", type=click.IntRange(8, 16384), default=2048, show_default=True,
+                         help="Of the image, pixels a side."),
+            click.option(
+                "--atlas",
+                type=click.Choice(["auto", "own", "xatlas", "squares"]),
+                default="auto",
+                show_default=True,
+                help="Whose texture coordinates: the mesh's own, xatlas's, or a square for every "
+                "two faces; auto takes the first that is there and works.",
+            ),
+            click.option("--time-limit", type=PositiveNumber(), default=60.0, show_default=True,
+                         help="Seconds that xatlas may take."),
+            force_option,
+            json_option,
+        )
+    ):  # fmt: skip
+        function = option(function)
+    return function
+
+
+@click.command(epilog="Example: meshsdf texture apply oak.mtex bunny.obj oak.glb")
+@click.argument("texture", type=path)
+@click.argument("mesh", type=path)
+@click.argument("out", type=path)
+@click.option(
+    "--vertex-colors/--image",
+    "at_vertices",
+    default=None,
+    help="Colours at vertices, or an image.  [default: vertices for .ply, else an image]",
+)
+@laid_options
+def apply(texture: str, mesh: str, out: str, at_vertices, size, atlas, time_limit, force, as_json):
+    """Give MESH the colours of TEXTURE (.mtex), OUT (.glb, .obj or .ply).
+
+    MESH may be any mesh of the textured surface: another resolution, remeshed, with other UVs.
+    """
+    console = Console("texture-apply", as_json=as_json)
+    console.watch_compilation()
+    from ..io import check_input, read_mesh, write_mesh
+    from ..io.atomic import check_output
+    from ..texture.journal import Project
+
+    check_input(mesh, kind="mesh")
+    check_output(out, force, kind="mesh")
+    with console.stage("load"):
+        loaded = read_mesh(mesh, warn=console.warn)
+        project = Project.open(texture, warn=console.warn)
+    with project, console.stage("colours"):
+        colored, facts = _colored(
+            project.texture, loaded, out, at_vertices, size, atlas, time_limit, console
+        )
+    with console.stage("write"):
+        write_mesh(out, colored, force=force)
+    seconds = console.timings("load", "colours", "write")
+    console.result(f"{out}: {_laid_words(facts)}, {seconds['total']:.2f} s")
+    head = {"texture": texture, "input": mesh, "output": out}
+    console.json(head | facts | {"seconds": seconds, "warnings": console.warnings})
+    return YES
+
+
+@click.command(epilog="Example: meshsdf texture export oak.mtex --to oak.vdb --to oak.glb")
+@click.argument("texture", type=path)
+@click.option(
+    "--to",
+    "outputs",
+    type=path,
+    multiple=True,
+    required=True,
+    help="A mesh (.glb, .obj with an image; .ply with vertex colours), a volume of colours (.vdb) "
+    "or the image alone (.png, .jpg, .exr), with the mesh that it fits beside it "
+    "(NAME-atlas.obj); may be given several times.",
+)
+@click.option(
+    "--channel",
+    type=click.Choice(["base", "normal", "height", "orm", "mask"]),
+    default="base",
+    show_default=True,
+    help="Of an image alone.",
+)
+@click.option("--displaced", is_flag=True, help="Move the mesh by the height channel first.")
+@click.option("--resolution", type=PositiveNumber(), default=256.0, show_default=True,
+              help="Of the volume that the displaced mesh comes from.")  # fmt: skip
+@laid_options
+def export(
+    texture, outputs, channel, displaced, resolution, size, atlas, time_limit, force, as_json
+):
+    """Write what TEXTURE (.mtex) shows on its own mesh."""
+    console = Console("texture-export", as_json=as_json)
+    console.watch_compilation()
+    from ..io.atomic import check_output
+    from ..texture.journal import Project
+
+    for out in outputs:
+        suffix = Path(out).suffix.lower()
+        check_output(out, force, kind=None if suffix in (*PICTURES, *VOLUMES) else "mesh")
+        if suffix in PICTURES:
+            check_output(_mesh_beside(out), force)
+    with console.stage("load"):
+        project = Project.open(texture, warn=console.warn)
+    written = []
+    with project:
+        shown = project.texture
+        mesh = shown.surface
+        if displaced:
+            mesh = _displaced(shown, mesh, resolution, console)
+        for out in outputs:
+            with console.stage("export"):
+                options = (size, atlas, time_limit, channel, force, console)
+                facts = _write(shown, mesh, out, *options)
+            n_bytes = Path(out).stat().st_size
+            written.append({"output": out, "bytes": n_bytes} | facts)
+            console.result(f"{out}: {_laid_words(facts)}, {file_size(n_bytes)}", is_last=False)
+    seconds = console.timings("load", "export")
+    facts = {"input": texture, "written": written, "seconds": seconds}
+    console.json(facts | {"warnings": console.warnings})
+    return YES
+
+
+@click.command(epilog="Example: meshsdf texture info oak.mtex")
+@click.argument("texture", type=path)
+@json_option
+def info(texture: str, as_json: bool) -> int:
+    """What is in TEXTURE (.mtex): texels, layers, operations."""
+    console = Console("texture-info", as_json=as_json)
+    from ..texture.journal import Project
+
+    with Project.open(texture, warn=console.warn) as project:
+        facts = texture_facts(project)
+        names = project.history.names
+    console.result(f"{texture}: {texture_words(facts)}", is_last=False)
+    for layer in reversed(facts["layers"]):
+        state = "" if layer["visible"] else ", hidden"
+        console.result(
+            f"  layer {layer['number']} {layer['name']!r}: {layer['mode']}, "
+            f"opacity {layer['opacity']:g}{state}, {layer['n_bricks']} bricks",
+            is_last=False,
+        )
+    console.result(f"  {facts['last_seq']} operations: {', '.join(names[-8:]) or 'none'}")
+    console.json({"input": texture} | facts | {"operations": names, "warnings": console.warnings})
+    return YES
+
+
+def _colored(texture, mesh, out, at_vertices, size, method, time_limit, console):
+    """The mesh with a texture's colours as the format can have them, and how that was done."""
+    from ..texture.atlas import atlas_for, textured, vertex_colored
+
+    suffix = Path(out).suffix.lower()
+    if at_vertices is None:
+        at_vertices = suffix == ".ply"
+    if suffix in (".stl", ".off"):
+        console.warn(f"{suffix} files hold no colours")
+        return mesh, {"colors": "none"}
+    if at_vertices:
+        return vertex_colored(texture, mesh), {"colors": "vertices"}
+    laid = atlas_for(mesh, size, method, time_limit=time_limit)
+    facts = {"colors": "image", "atlas": laid.method, "size": size, "coverage": laid.coverage}
+    return textured(texture, laid, Path(out).stem), facts
+
+
+def _write(texture, mesh, out, size, method, time_limit, channel, force, console) -> dict:
+    suffix = Path(out).suffix.lower()
+    if suffix in VOLUMES:
+        from ..io.vdb_texture import write_vdb_texture
+
+        write_vdb_texture(out, texture, force=force)
+        return {"colors": "voxels"}
+    from ..io import write_mesh
+
+    if suffix in PICTURES:
+        from ..io.pictures import write_picture
+        from ..texture.atlas import atlas_colors, atlas_for
+
+        laid = atlas_for(mesh, size, method, time_limit=time_limit)
+        write_picture(out, atlas_colors(texture, laid, channel=channel), force=force)
+        write_mesh(_mesh_beside(out), laid.mesh, force=force)
+        return {"colors": "image", "atlas": laid.method, "size": size, "coverage": laid.coverage}
+    colored, facts = _colored(texture, mesh, out, None, size, method, time_limit, console)
+    write_mesh(out, colored, force=force)
+    return facts
+
+
+def _mesh_beside(picture: str) -> Path:
+    """Where the mesh goes that a picture alone fits."""
+    return Path(picture).with_name(f"{Path(picture).stem}-atlas.obj")
+
+
+def _displaced(texture, mesh, resolution: float, console: Console):
+    from ..surface import marching_cubes
+    from ..texture.displace import displaced_band
+
+    with console.stage("displacement"):
+        band = displaced_band(texture, mesh, resolution=resolution, progress=console.progress)
+        return marching_cubes(band)
+
+
+def _laid_words(facts: dict) -> str:
+    words = {
+        "none": "no colours",
+        "vertices": "colours at vertices",
+        "voxels": "colours at voxels",
+        "image": "an image",
+    }[facts["colors"]]
+    if facts["colors"] != "image":
+        return words
+    by = {"own": "the mesh's own coordinates", "xatlas": "coordinates by xatlas",
+          "squares": "a square for every two faces"}[facts["atlas"]]  # fmt: skip
+    return f"{words} of {facts['size']} x {facts['size']} pixels, {by}"

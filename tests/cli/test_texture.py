@@ -1,0 +1,205 @@
+"""meshsdf texture: made from meshes, formulas and images; out to meshes, pictures and volumes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from meshsdf.io import read_mesh, write_mesh
+from meshsdf.io.pictures import read_picture
+from meshsdf.io.vdb import read_vdb_grids
+from meshsdf.mesh.primitives import box_mesh, icosphere
+from meshsdf.srgb import srgb_rgba
+from meshsdf.texture.atlas import atlas_for, textured, vertex_colored
+from meshsdf.texture.brush import Brush
+from meshsdf.texture.journal import Project
+from meshsdf.texture.mip import bake
+from meshsdf.texture.operations import Operation
+from meshsdf.texture.procedural import procedural
+from meshsdf.texture.stroke_record import StrokeRecord
+from meshsdf.texture.volume_texture import VolumeTexture
+
+from .examples import ball
+
+KEYS = """input output bytes kind texel base n_levels n_texels n_bricks n_tiles memory last_seq
+channels layers seconds warnings"""
+
+
+@pytest.fixture
+def mesh(tmp_path):
+    return ball(tmp_path / "ball.ply", radius=2.0, subdivisions=3)
+
+
+@pytest.fixture
+def checkered(tmp_path):
+    """A box with an image of its own, black and white in space."""
+    box = box_mesh()
+    texture = VolumeTexture.around(box, resolution=64)
+    bake(texture, texture.add_layer(), procedural("checker", scale=0.25))
+    path = tmp_path / "checkered.obj"
+    write_mesh(path, textured(texture, atlas_for(box, 512, "squares")))
+    return path
+
+
+def test_a_solid_texture_is_made_and_told(cli, mesh, tmp_path):
+    out = tmp_path / "wood.mtex"
+    options = ["--kind", "wood", "--parameter", "ring_width=0.2", "--resolution", 48]
+    outcome = cli("texture", "procedural", mesh, out, *options, "--json")
+    assert outcome.code == 0
+    facts = outcome.json
+    assert next(iter(facts.items())) == ("schema", "meshsdf.texture-procedural/1")
+    assert set(KEYS.split()) <= set(facts)
+    assert facts["texel"] == pytest.approx(4 / 48)
+    assert [layer["name"] for layer in facts["layers"]] == ["wood"]
+    assert facts["last_seq"] == 2
+    told = cli("texture", "info", out, "--json").json
+    assert told["n_texels"] == facts["n_texels"]
+    assert "2 operations" in cli("texture", "info", out).out
+    again = cli("texture", "procedural", mesh, out, *options)
+    assert again.code == 3
+    assert "exists" in again.err
+    assert not [path for path in tmp_path.iterdir() if path.suffix not in (".mtex", ".ply")]
+
+
+def test_layers_are_added_to_what_exists(cli, mesh, tmp_path):
+    out = tmp_path / "two.mtex"
+    assert (
+        cli("texture", "procedural", mesh, out, "--kind", "checker", "--resolution", 32).code == 0
+    )
+    more = ["--kind", "clouds", "--add", "--layer", "sky"]
+    facts = cli("texture", "procedural", mesh, out, *more, "--json").json
+    assert [layer["name"] for layer in facts["layers"]] == ["checker", "sky"]
+    assert cli("texture", "procedural", mesh, out, *more, "--resolution", 64).code == 2
+
+
+def test_a_meshs_own_image_goes_through_space_to_other_files(cli, checkered, tmp_path):
+    out = tmp_path / "box.mtex"
+    assert cli("texture", "bake", checkered, out, "--resolution", 96).code == 0
+    other = tmp_path / "other.glb"
+    facts = cli("texture", "apply", out, checkered, other, "--size", 512, "--json").json
+    assert (facts["colors"], facts["atlas"]) == ("image", "own")
+    before = read_mesh(checkered).materials[0].image[..., :3].astype(float)
+    after = read_mesh(other).materials[0].image[..., :3].astype(float)
+    assert np.abs(before - after).mean() < 6
+    dense = tmp_path / "dense.ply"
+    write_mesh(tmp_path / "plain.ply", read_mesh(checkered))
+    facts = cli("texture", "apply", out, tmp_path / "plain.ply", dense, "--json").json
+    assert facts["colors"] == "vertices"
+    assert read_mesh(dense).vertex_colors is not None
+
+
+def test_everything_that_can_be_exported_is(cli, checkered, tmp_path):
+    out = tmp_path / "box.mtex"
+    assert cli("texture", "bake", checkered, out, "--resolution", 64).code == 0
+    names = ["a.exr", "b.png", "c.ply", "d.vdb", "e.glb", "f.obj"]
+    to = [text for name in names for text in ("--to", tmp_path / name)]
+    options = ["--atlas", "squares", "--size", 256]
+    facts = cli("texture", "export", out, *to, *options, "--json").json
+    assert [one["colors"] for one in facts["written"]] == [
+        "image", "image", "vertices", "voxels", "image", "image",
+    ]  # fmt: skip
+    linear, encoded = read_picture(tmp_path / "a.exr"), read_picture(tmp_path / "b.png")
+    same = np.rint(255 * srgb_rgba(linear.reshape(-1, 4).astype(np.float32)))[:, :3]
+    assert np.abs(same - encoded.reshape(-1, encoded.shape[2])[:, :3]).max() <= 1
+    assert read_mesh(tmp_path / "a-atlas.obj").uv is not None
+    (colors,) = read_vdb_grids(tmp_path / "d.vdb")
+    assert colors.name == "Cd"
+    assert (tmp_path / "f.mtl").exists()
+    assert cli("texture", "export", out, *to, *options).code == 3
+
+
+def test_an_image_is_projected(cli, mesh, tmp_path):
+    picture = np.zeros((64, 64, 3), np.uint8)
+    picture[:, :32], picture[:, 32:] = [255, 0, 0], [0, 0, 255]
+    Image.fromarray(picture).save(tmp_path / "halves.png")
+    out = tmp_path / "front.mtex"
+    camera = ["--by", "camera", "--eye", "0,0,9", "--target", "0,0,0", "--field-of-view", 60]
+    command = ["texture", "project", mesh, tmp_path / "halves.png", out, "--resolution", 64]
+    assert cli(*command, *camera).code == 0
+    with Project.open(out) as project:
+        places = np.array([[-0.6, 0, 1.9], [0.6, 0, 1.9], [0, 0, -2.0]])
+        shown = project.texture.colors(places, places)
+    assert shown[:2].tolist() == [[1, 0, 0, 1], [0, 0, 1, 1]]
+    assert shown[2, 3] == 0
+    assert cli(*command, "--by", "camera", "--force").code == 2
+    for by in ("planar", "triplanar", "cylindrical", "spherical", "decal"):
+        assert cli(*command, "--by", by, "--force").code == 0, by
+        place = np.array([[0.3, 1.95, 0.2]])
+        with Project.open(out) as project:
+            assert project.texture.colors(place, place)[0, 3] == 1, by
+
+
+def test_a_picture_shows_the_texture(cli, mesh, tmp_path):
+    out = tmp_path / "red.ply"
+    red = np.tile(np.array([1, 0, 0, 1], np.float32), (icosphere(subdivisions=3).n_vertices, 1))
+    write_mesh(out, replace(read_mesh(mesh), vertex_colors=red))
+    assert cli("texture", "bake", out, tmp_path / "red.mtex", "--resolution", 32).code == 0
+    for number, words in enumerate(([tmp_path / "red.mtex"], [mesh])):
+        options = ["--texture", tmp_path / "red.mtex"] if number else []
+        picture = tmp_path / f"{number}.png"
+        assert cli("render", *words, picture, "--width", 64, *options).code == 0
+        middle = np.asarray(Image.open(picture))[24, 32].astype(int)
+        assert middle[0] > 120
+        assert middle[1] < 90
+    first, second = (np.asarray(Image.open(tmp_path / f"{k}.png")).astype(int) for k in (0, 1))
+    assert np.abs(first - second).max() <= 3
+    assert cli("render", mesh, tmp_path / "x.png", "--texture", mesh, "--error-of", mesh).code == 2
+
+
+def test_a_stroke_of_height_moves_the_exported_mesh(cli, mesh, tmp_path):
+    out, moved = tmp_path / "grown.mtex", tmp_path / "grown.ply"
+    brush = Brush(radius=1.0, hardness=0.5, channel="height", value=3.0)
+    top = np.array([[0.0, 0.0, 2.0]])
+    with Project.create(out, read_mesh(mesh), resolution=64) as project:
+        project.apply(Operation("add-layer", {"name": "heights"}))
+        record = StrokeRecord(brush, top, top / 2, np.ones(1), project.texture.layers[-1].number)
+        project.apply(Operation("stroke", record.to_params()))
+        texel = project.texture.octree.texel
+    options = ["--to", moved, "--displaced", "--resolution", 48]
+    assert cli("texture", "export", out, *options).code == 0
+    vertices = read_mesh(moved).vertices
+    highest = vertices[:, 2].max()
+    assert highest == pytest.approx(2 + 3 * texel, abs=0.02)
+    below = np.linalg.norm(vertices[vertices[:, 2] < 0], axis=1)
+    assert np.abs(below - 2).max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["procedural", "MESH", "x.mtex", "--kind", "wod"], 3, "wood"),
+        (["procedural", "MESH", "x.mtex", "--parameter", "ring=1"], 3, "ring_width"),
+        (["procedural", "MESH", "x.txt"], 2, ".mtex"),
+        (["procedural", "MESH", "x.mtex", "--resolution", "64", "--texel", "1"], 2, "exclude"),
+        (["procedural", "MESH", "x.mtex", "--resolution", "1e9"], 3, "ask for at most"),
+        (["bake", "none.obj", "x.mtex"], 3, "no such file"),
+        (["info", "none.mtex"], 3, "fix"),
+        (["info", "MESH"], 3, "no project"),
+        (["apply", "MESH", "MESH", "x.glb"], 3, "no project"),
+        (["project", "MESH", "MESH", "x.mtex"], 3, "not a readable image"),
+        (["export", "none.mtex", "--to", "x.stl1"], 3, "suffix"),
+        (["paint", "x"], 2, "No such command"),
+    ],
+)
+def test_what_cannot_be_done_is_told(cli, mesh, tmp_path, words, code, said):
+    words = [mesh if word == "MESH" else word for word in words]
+    words = [tmp_path / word if str(word).startswith("x.") else word for word in words]
+    outcome = cli("texture", *words)
+    assert (outcome.code, said in outcome.err) == (code, True), outcome.err
+    assert not (tmp_path / "x.mtex").exists()
+
+
+def test_kinds_and_parameters_are_listed(cli):
+    outcome = cli("texture", "procedural", "--list")
+    assert outcome.code == 0
+    assert "wood_grain" in outcome.out
+    assert "ring_width=" in outcome.out
+
+
+def test_vertex_colours_lie_where_the_texture_says():
+    mesh = icosphere(subdivisions=3)
+    texture = VolumeTexture.around(mesh, resolution=64)
+    bake(texture, texture.add_layer(), procedural("stripes", scale=1.0))
+    colored = vertex_colored(texture, mesh)
+    assert np.ptp(colored.vertex_colors[:, 0]) > 0.3
