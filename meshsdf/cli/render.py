@@ -160,6 +160,7 @@ def command(
                 from .texture_look import texture_paint
 
                 look["paint"] = texture_paint(painted, loaded, camera, height)
+                look["even_light"] = False
                 facts |= {"texture": texture}
             picture = render_mesh(loaded, camera, **look)
     with console.stage("write"):

@@ -38,6 +38,7 @@ def render_mesh(
     samples: int = 3,
     smooth: bool | None = None,
     occlusion: bool = True,
+    even_light: bool | None = None,
     background: Sequence[Number] | np.ndarray | None = None,
     progress: Progress = silent,
 ) -> Picture:
@@ -55,7 +56,7 @@ def render_mesh(
         ``paint(points, faces)`` gets (k, 3) float64 points on the mesh, world units, and the (k,)
         int32 faces they lie on, and returns (k, 3) linear colours. It is called first for what
         the middles of pixels show, then for what edges show. By default the mesh's own colours
-        and textures, or clay. Light changes how bright paint is, and not its hue.
+        and textures, or clay.
     samples : int
         Pixels on edges of shape or colour are means of ``samples x samples`` places, the others
         show their middle.
@@ -64,6 +65,9 @@ def render_mesh(
         suits the size of the faces. A `Scene` has made that choice already.
     occlusion : bool
         Darken what the rest of the mesh hides from the sky.
+    even_light : bool, optional
+        Change how bright colours are, and little, and not their hue, as suits colours that mean
+        something; by default if there is ``paint``.
     background : (3,) linear RGB, optional
         None leaves it transparent.
     progress : Progress
@@ -99,6 +103,8 @@ def render_mesh(
     scene = mesh if isinstance(mesh, Scene) else Scene(mesh, smooth=smooth)
     camera = camera or frame(scene.mesh, aspect=width / height)
     studio = _Studio(scene, camera, (width, height), paint, has_sky=occlusion)
+    if even_light is not None:
+        studio.is_painted = even_light
     pixels = _pixels_before(scene.mesh, camera, width, height)
     middles = studio.look(pixels + 0.5, pixels, 0, N_RAYS, progress)
     shown = pixels[middles.place]
