@@ -8,6 +8,7 @@ operations are the document, texels are what they make.
 import os
 import sqlite3
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from ..arrays import Number
@@ -27,7 +28,14 @@ from .journal_log import (
     read_log,
     steps_of,
 )
-from .journal_schema import FAULTS, check_header, connect, header_damage, lost_commits
+from .journal_schema import (
+    FAULTS,
+    check_header,
+    connect,
+    header_damage,
+    integrity,
+    lost_commits,
+)
 from .operations import TURNS, Operation, perform
 from .project_lock import ProjectLock
 from .project_parts import read_parts, write_new
@@ -183,10 +191,9 @@ class Project:
             raise Damaged(found)
         n_lost = lost_commits(path)
         connection = connect(path)
+        helper = ThreadPoolExecutor(1)
         try:
-            (verdict,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
-            if verdict != "ok":
-                raise Damaged(verdict)
+            verdict = helper.submit(integrity, path)
             texture, origin, sound = read_parts(connection, warn)
             if not sound:
                 raise Damaged("mesh or octree are not as they were written")
@@ -195,10 +202,14 @@ class Project:
             if wrong:
                 raise Damaged(wrong)
             project._restore(entries)
+            if verdict.result() != "ok":
+                raise Damaged(verdict.result())
             project._say_what_is_missing(n_lost)
         except BaseException:
+            helper.shutdown()
             connection.close()
             raise
+        helper.shutdown()
         return project
 
     def __enter__(self) -> "Project":

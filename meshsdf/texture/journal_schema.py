@@ -56,6 +56,16 @@ def connect(path: Path) -> sqlite3.Connection:
     return connection
 
 
+def integrity(path: Path) -> str:
+    """What SQLite says of the pages of a file: "ok", or what is wrong first."""
+    connection = connect(path)
+    try:
+        (verdict,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+    finally:
+        connection.close()
+    return verdict
+
+
 def create(path: Path) -> sqlite3.Connection:
     """A new database with empty tables."""
     connection = connect(path)
