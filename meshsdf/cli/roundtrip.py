@@ -53,6 +53,11 @@ from .reports import check_reports, limit_words, report_option, write_reports
     help="Double the last resolution until the largest distance is below, world units; "
     "exit 1 if that cannot be.",
 )
+@click.option(
+    "--carry-texture",
+    is_flag=True,
+    help="Also carry MESH's colours to what came back, in texels of a voxel, and compare them.",
+)
 @report_option
 @click.option("--timings", is_flag=True, help="Tell times in the report, which then vary.")
 @force_option
@@ -68,6 +73,7 @@ def command(
     sign: str,
     max_error: tuple[float, bool] | None,
     until: float | None,
+    carry_texture: bool,
     reports: tuple[str, ...],
     timings: bool,
     force: bool,
@@ -90,6 +96,10 @@ def command(
     check_reports(reports, force)
     with console.stage("load"):
         loaded = read_mesh(mesh, warn=console.warn)
+    if carry_texture:
+        from ..report.color_loss import require_colors
+
+        require_colors(loaded, f"{mesh}, --carry-texture")
     with console.stage("check"):
         found = check(loaded, self_intersections=False)
         choice = choose_sign(found, sign)
@@ -103,6 +113,7 @@ def command(
         report=found,
         max_memory=max_memory,
         details=bool(reports),
+        carry_texture=carry_texture,
         progress=console.progress,
     )
     last = [trip.last(method) for method in trip.methods]
@@ -134,7 +145,7 @@ def command(
             "input": mesh,
             "method": ",".join(trip.methods),
             "sign": choice.method,
-            "rows": [row.to_json() for row in trip.rows],
+            "rows": trip.rows_to_json(),
             "order": trip.order(trip.methods[0]),
             "orders": {method: trip.order(method) for method in trip.methods},
             "passed": not missed,
@@ -169,4 +180,6 @@ def _command(options: dict) -> str:
             words += [f"--{name.replace('_', '-')}", f"{options[name]:g}"]
     if options["max_error"] is not None:
         words += ["--max-error", limit_words(options["max_error"])]
+    if options["carry_texture"]:
+        words.append("--carry-texture")
     return shlex.join(words)

@@ -3,7 +3,11 @@
 import numpy as np
 from numba import njit
 
-ONE = np.uint64(1)
+
+@njit(cache=True, nogil=True, inline="always")
+def row_of(masks, e, row):
+    """The eight bits of texels 8 row ... 8 row + 7 of an entry; most rows have none."""
+    return np.int64((masks[e, row >> 3] >> np.uint64((row & 7) << 3)) & np.uint64(255))
 
 
 @njit(cache=True, nogil=True)
@@ -12,10 +16,14 @@ def count_written(masks, entries, slots, pool, nothing, counts):
     for i in range(len(entries)):
         e, slot = entries[i], slots[i]
         n, written = 0, False
-        for t in range(512):
-            if (masks[e, t >> 6] >> np.uint64(t & 63)) & ONE:
-                n += 1
-                written |= pool[slot, t] != nothing
+        for row in range(64):
+            bits = row_of(masks, e, row)
+            if bits == 0:
+                continue
+            for t in range(8 * row, 8 * row + 8):
+                if (bits >> (t & 7)) & 1:
+                    n += 1
+                    written |= pool[slot, t] != nothing
         counts[i] = n if written else 0
 
 
@@ -25,10 +33,14 @@ def pack_bricks(masks, entries, slots, pool, packed):
     at = 0
     for i in range(len(entries)):
         e, slot = entries[i], slots[i]
-        for t in range(512):
-            if (masks[e, t >> 6] >> np.uint64(t & 63)) & ONE:
-                packed[at] = pool[slot, t]
-                at += 1
+        for row in range(64):
+            bits = row_of(masks, e, row)
+            if bits == 0:
+                continue
+            for t in range(8 * row, 8 * row + 8):
+                if (bits >> (t & 7)) & 1:
+                    packed[at] = pool[slot, t]
+                    at += 1
 
 
 @njit(cache=True, nogil=True)
@@ -37,7 +49,11 @@ def unpack_bricks(masks, entries, slots, packed, pool):
     at = 0
     for i in range(len(entries)):
         e, slot = entries[i], slots[i]
-        for t in range(512):
-            if (masks[e, t >> 6] >> np.uint64(t & 63)) & ONE:
-                pool[slot, t] = packed[at]
-                at += 1
+        for row in range(64):
+            bits = row_of(masks, e, row)
+            if bits == 0:
+                continue
+            for t in range(8 * row, 8 * row + 8):
+                if (bits >> (t & 7)) & 1:
+                    pool[slot, t] = packed[at]
+                    at += 1

@@ -12,6 +12,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
 from . import notation
+from .color_words import COLOR_KINDS, COLOR_MEASURES, COLOR_WORDS
 from .compare_report import main_unit, units_of, words_of
 from .heat_maps import HeatMaps
 from .pair_words import ROUND_TRIP
@@ -50,6 +51,9 @@ def page(data: dict, maps: dict[int, HeatMaps] | None = None) -> str:
         "units": UNITS,
         "unit": ("voxels", "voxels"),
         "budget_words": BUDGET_WORDS,
+        "color_kinds": COLOR_KINDS,
+        "color_measures": COLOR_MEASURES,
+        "color_words": COLOR_WORDS,
     }
     return environment.get_template("page.html.j2").render(
         says=ROUND_TRIP,

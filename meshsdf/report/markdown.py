@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from unicodedata import category
 
+from .color_words import COLOR_KINDS, COLOR_MEASURES, COLOR_WORDS
 from .notation import count, interval, place, written
 from .pointers import MEASURES, UNITS, distance_pointers, look_up
 from .verdict import METHOD_WORDS
@@ -16,6 +17,7 @@ def markdown(data: dict) -> str:
     parts += [escaped(sentence) for sentence in data["verdict"]["sentences"]]
     parts += [f"**{escaped(sentence)}**" for sentence in data["limits"]["missed"]]
     parts += ["## Every resolution", _rows(data)]
+    parts += _colors(data)
     for index in data["last_rows"]:
         if not data["rows"][index]["is_empty"]:
             parts += _last(data["rows"][index])
@@ -46,6 +48,26 @@ def _rows(data: dict) -> str:
         if fit["order"] is not None
     ]
     return "\n\n".join(lines)
+
+
+def _colors(data: dict) -> list[str]:
+    """What became of the colours, if that was asked."""
+    rows = [row for row in data["rows"] if row.get("colors")]
+    if not rows:
+        return []
+    head = ["resolution", "method", "ΔE against", *(label for _, label in COLOR_MEASURES)]
+    head += ["near", "was", "became"]
+    body = []
+    for row in rows:
+        for kind, label, _ in COLOR_KINDS:
+            found = row["colors"][kind]
+            cells = [written(row["resolution"], digits=6), METHOD_WORDS[row["method"]], label]
+            cells += [f"≈ {written(found[name], digits=3)}" for name, _ in COLOR_MEASURES]
+            cells += [place(found["where"]), *(f"`{found[n]}`" for n in ("expected", "found"))]
+            body.append(cells)
+    n_points = written(rows[0]["colors"]["n_points"])
+    notes = [f"{label.capitalize()}: {words}." for _, label, words in COLOR_KINDS]
+    return ["## Colours", n_points.join(COLOR_WORDS), _table(head, body), *notes]
 
 
 def _last(row: dict) -> list[str]:

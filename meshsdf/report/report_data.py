@@ -53,6 +53,9 @@ def report_data(
 ) -> dict:
     """Gather everything a report tells, as bool, int, float, str, list, dict and None."""
     rows = [_row(row, with_seconds=asked.seconds is not None) for row in trip.rows]
+    if trip.has_colors:
+        for row, told in zip(trip.rows, rows, strict=True):
+            told["colors"] = row.colors and row.colors.to_json()
     data = {
         "schema": SCHEMA,
         "input": mesh_data(mesh, asked.name),

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -11,12 +11,14 @@ from ..arrays import Number, Values
 from ..errors import MemoryLimitError, ReportError
 from ..grid import NarrowBand
 from ..mesh import Mesh
+from ..mesh.measures import area
 from ..mesh.two_set import TwoSetReport, check
 from ..progress import Progress, silent
 from ..sdf import mesh_to_band
 from ..sdf.memory import require_memory
 from ..sdf.sign import SignMethod
 from ..surface import default_level, dual_contouring, marching_cubes
+from .color_difference import ColorLoss
 from .compare import Comparison, compare
 from .row_details import RowDetails, coarse_details, row_details
 
@@ -54,9 +56,11 @@ class RoundTripRow:
     warnings : tuple of str
         What to know about this row.
     seconds : dict
-        Time for distance, surface and compare, and for details where asked.
+        Time for distance, surface and compare, and for colors and details where asked.
     details : RowDetails or None
         How distances are spread, and where the error comes from; None unless asked for.
+    colors : ColorLoss or None
+        What became of the mesh's colours; None unless asked for, and where nothing came back.
     """
 
     resolution: float
@@ -68,6 +72,7 @@ class RoundTripRow:
     warnings: tuple[str, ...]
     seconds: dict[str, float]
     details: RowDetails | None = None
+    colors: ColorLoss | None = None
 
     def is_within(self, limit: Number, in_voxels: bool = False) -> bool:
         """Whether the error is certainly at most ``limit``, in world units or in voxels."""
@@ -93,9 +98,10 @@ class RoundTripRow:
 
 @dataclass(frozen=True, eq=False)
 class RoundTrip:
-    """All rows, coarse to fine as asked, and the order of the error between them."""
+    """All rows, coarse to fine as asked, and whether colours were carried, too."""
 
     rows: tuple[RoundTripRow, ...]
+    has_colors: bool = False
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -105,6 +111,14 @@ class RoundTrip:
     def last(self, method: str) -> RoundTripRow:
         """Return the finest row of a method."""
         return [row for row in self.rows if row.method == method][-1]
+
+    def rows_to_json(self) -> list[dict]:
+        """Return plain types; "colors" are among them only if they were asked for."""
+        plain = [row.to_json() for row in self.rows]
+        if self.has_colors:
+            for row, told in zip(self.rows, plain, strict=True):
+                told["colors"] = row.colors and row.colors.to_json()
+        return plain
 
     def order(self, method: str) -> float | None:
         """Return the slope of log error against log voxel size by least squares; None for one row.
@@ -132,6 +146,7 @@ def roundtrip(
     report: TwoSetReport | None = None,
     max_memory: Number | None = None,
     details: bool = False,
+    carry_texture: bool = False,
     progress: Progress = silent,
 ) -> RoundTrip:
     """Convert a mesh to a narrow band and back, and measure what was lost.
@@ -152,13 +167,18 @@ def roundtrip(
     details : bool
         Also certify means and percentiles, and of the finest row of each method find thin parts
         lost and say where the error comes from (`row_details`); takes many times as long.
+    carry_texture : bool
+        Also carry the mesh's colours to what came back, in texels of a voxel, and tell what
+        became of them (`color_loss`).
 
     Raises
     ------
     ReportError
-        No resolution or no method given.
+        No resolution or no method given, or colours are to be carried and there are none.
     SdfError, MemoryLimitError
         The mesh cannot be converted.
+    TextureError
+        The mesh's colours are broken.
 
     Notes
     -----
@@ -178,7 +198,7 @@ def roundtrip(
         "max_memory": max_memory,
         "progress": progress,
     }
-    work = _Work(mesh, options)
+    work = _Work(mesh, options, _carrier(mesh, options) if carry_texture else None)
     rows = [row for n in resolutions for row in work.rows(n, methods)]
     while until is not None:
         resolution = 2 * rows[-1].resolution
@@ -191,7 +211,14 @@ def roundtrip(
             break
     if details:
         work.add_details(rows)
-    return RoundTrip(tuple(rows))
+    return RoundTrip(tuple(rows), has_colors=carry_texture)
+
+
+def _carrier(mesh: Mesh, options: dict) -> Any:
+    """A `ColorCarrier` of the mesh's colours."""
+    from .color_loss import ColorCarrier  # which imports all of the textures
+
+    return ColorCarrier(mesh, max_memory=options["max_memory"], progress=options["progress"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +227,7 @@ class _Work:
 
     mesh: Mesh
     options: dict  # of mesh_to_band
+    carrier: Any = None  # a ColorCarrier, if colours are asked for
 
     @property
     def progress(self) -> Progress:
@@ -210,7 +238,21 @@ class _Work:
         begin = time.perf_counter()
         band = mesh_to_band(self.mesh, resolution=resolution, **self.options)
         spent = time.perf_counter() - begin
-        return [self._row(float(resolution), band, spent, method) for method in methods]
+        rows = [self._row(float(resolution), band, spent, method) for method in methods]
+        return rows if self.carrier is None else self._colored(rows)
+
+    def _colored(self, rows: list[RoundTripRow]) -> list[RoundTripRow]:
+        """Rows of one voxel size with what became of the colours: one texture serves them all."""
+        colored, texture, begin = [], None, time.perf_counter()
+        for row in rows:
+            found = None
+            if row.surface.n_faces and area(row.surface) > 0:
+                texture = texture or self.carrier.texture(row.voxel_size)
+                found = self.carrier.loss(texture, row.surface)
+            spent, begin = time.perf_counter() - begin, time.perf_counter()
+            seconds = row.seconds | {"colors": round(spent, 4)}
+            colored.append(replace(row, colors=found, seconds=seconds))
+        return colored
 
     def _row(
         self, resolution: float, band: NarrowBand, spent: float, method: Method

@@ -1,5 +1,7 @@
 """A round trip as a table for people."""
 
+from .color_difference import ColorDifference
+from .notation import place, written
 from .roundtrip import RoundTrip, RoundTripRow
 
 HEADS = (
@@ -20,7 +22,7 @@ WIDTHS = (10, 17, 11, 25, 15, 17, 9, 9, 9, 9, 7, 8)
 
 
 def roundtrip_table(trip: RoundTrip) -> str:
-    """Return one line per resolution, and the order of the error if there are several."""
+    """Return one line per resolution, the order of the error if there are several, and colours."""
     lines = ["".join(f"{head:>{width}}" for head, width in zip(HEADS, WIDTHS, strict=True))]
     lines += [
         "".join(f"{cell:>{width}}" for cell, width in zip(_cells(row), WIDTHS, strict=False))
@@ -29,7 +31,29 @@ def roundtrip_table(trip: RoundTrip) -> str:
     orders = [(method, trip.order(method)) for method in trip.methods]
     if found := [f"{method} {order:.2f}" for method, order in orders if order is not None]:
         lines.append(f"observed order of the largest distance: {', '.join(found)}")
-    return "\n".join(lines)
+    return "\n".join(lines + color_lines(trip))
+
+
+def color_lines(trip: RoundTrip) -> list[str]:
+    """One line per resolution of what became of the colours, if that was asked."""
+    lines = []
+    for row in trip.rows if trip.has_colors else ():
+        name = f"colours at {row.resolution:g}"
+        name += f" by {row.method}" if len(trip.methods) > 1 else ""
+        if row.colors is None:
+            lines.append(f"{name}: nothing came back")
+            continue
+        sharp, filtered = row.colors.sharp, row.colors.filtered
+        where = f"{sharp.expected} became {sharp.found} at {place(sharp.where.tolist())}"
+        lines.append(f"{name}: {_differences(sharp)} ({where})")
+        lines.append(f"  apart from the blur of a voxel: {_differences(filtered)}")
+    return lines
+
+
+def _differences(found: ColorDifference) -> str:
+    numbers = found.mean, found.percentile_95, found.largest
+    mean, most, largest = (written(number, digits=3) for number in numbers)
+    return f"ΔE {mean} on average, 95 % below {most}, at most {largest} seen"
 
 
 def _cells(row: RoundTripRow) -> tuple[str, ...]:

@@ -215,7 +215,8 @@ def _load_chunk(texture: VolumeTexture, layer: LoadedLayer, row: tuple) -> bytes
     # Writable, so that the kernel is not compiled anew
     packed = np.frombuffer(data, pool.dtype.newbyteorder("<"), offset=2).astype(pool.dtype)
     slots, entries = slots[entries], entries + np.int32(CHUNK * chunk)
-    n_texels = int(np.diff(texture.octree.tables.texel_first)[entries].sum())
+    first = texture.octree.tables.texel_first
+    n_texels = int((first[entries + 1] - first[entries]).sum())
     if (slots < 0).any() or len(packed) != n_texels:
         raise Damaged(f"{what} does not fit its bricks")
     unpack_bricks(masks, entries, slots, packed, pool)

@@ -41,6 +41,7 @@ class BrickPool:
         self._waiting: set[int] = set()  # slots that none needs, but that recordings may ask for
         self.arrays: dict[str, np.ndarray] = {}
         self._free: list[int] = list(range(FIRST_CAPACITY - 1, -1, -1))
+        self._first_clean = 0  # in slots from here on nothing was ever written
         self.use("base")
 
     @property
@@ -66,8 +67,7 @@ class BrickPool:
             raise TextureError(what, "channel=...", f"use one of {', '.join(self.channels)}")
         if name not in self.arrays:
             channel = self.channels[name]
-            shape = (len(self.holders), TEXELS)
-            self.arrays[name] = np.full(shape, channel.nothing, channel.dtype)
+            self.arrays[name] = _empty_bricks(len(self.holders), channel)
         return self.arrays[name]
 
     def take(self, n: int) -> Slots:
@@ -76,8 +76,10 @@ class BrickPool:
         slots = np.array([self._free.pop() for _ in range(n)], np.int32)
         self.holders[slots] = 1
         self.born[slots] = self.generation
+        used_before = slots[slots < self._first_clean]
         for name, array in self.arrays.items():
-            array[slots] = self.channels[name].nothing
+            array[used_before] = self.channels[name].nothing
+        self._first_clean = max(self._first_clean, int(slots.max(initial=-1)) + 1)
         return slots
 
     def reserve(self, n: int) -> None:
@@ -141,11 +143,17 @@ class BrickPool:
         self.holders = np.concatenate([self.holders, np.zeros(more, np.int32)])
         self.born = np.concatenate([self.born, np.zeros(more, np.int64)])
         for name, array in self.arrays.items():
-            # New pages of memory are taken only when they are written
-            grown = np.empty((before + more, TEXELS), array.dtype)
+            grown = _empty_bricks(before + more, self.channels[name])
             grown[:before] = array
             self.arrays[name] = grown
         self._free = list(range(before + more - 1, before - 1, -1)) + self._free
+
+
+def _empty_bricks(n: int, channel: Channel) -> np.ndarray:
+    """(n, 512) texels in which nothing was written; zeros take memory only when they are."""
+    if channel.nothing == 0:
+        return np.zeros((n, TEXELS), channel.dtype)
+    return np.full((n, TEXELS), channel.nothing, channel.dtype)
 
 
 class TilePool:

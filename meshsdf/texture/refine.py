@@ -177,7 +177,8 @@ def family_of(texture: VolumeTexture, entries: Entries) -> Family:
 def seen_above(texture: VolumeTexture, layer: Layer, entries: Entries, name: str) -> Numbers:
     """What a channel shows at the texels of entries of one level by the levels above it."""
     tables = texture.octree.tables._replace(texel=1.0)  # places are then free of rounding
-    first = np.concatenate([[0], np.cumsum(np.diff(tables.texel_first)[entries])])
+    n_texels = tables.texel_first[entries + 1] - tables.texel_first[entries]
+    first = np.concatenate([[0], np.cumsum(n_texels)])
     points, normals = np.empty((first[-1], 3)), np.empty((first[-1], 3))
     seen = np.empty((first[-1], 4), np.float32)
     ranges = even_ranges(len(entries), -(-len(entries) // (ENTRIES_PER_PIECE // 8)))
