@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet
-from .texel_codes import F0, F1
+from .texel_codes import F0, F1, decode
 from .texture_blocks import BLOCK, COLUMNS, block_values
 from .texture_lookup import ABSENT, needed, read_texel
 
@@ -104,7 +104,8 @@ def nearest(tables, slots, pool, tiles, kind, points, normals, begin, end, out):
     heads, pages, groups, sheets = tables.heads, tables.pages, tables.groups, tables.sheets
     masks, top, scale = tables.masks, len(tables.heads), 1.0 / tables.texel
     every_normal = int(len(normals) > 1)
-    code, at_x, at_y, at_z = np.int32(NO_ENTRY), np.int64(-1 << 62), np.int64(0), np.int64(0)
+    code, slot = np.int32(NO_ENTRY), np.int32(ABSENT)
+    at_x, at_y, at_z = np.int64(-1 << 62), np.int64(0), np.int64(0)
     for n in range(begin, end):
         m = n * every_normal
         x, y, z = points[n, 0] * scale, points[n, 1] * scale, points[n, 2] * scale
@@ -112,13 +113,21 @@ def nearest(tables, slots, pool, tiles, kind, points, normals, begin, end, out):
         if not (abs(x) < 4.0e15 and abs(y) < 4.0e15 and abs(z) < 4.0e15):
             out[n, 0] = out[n, 1] = out[n, 2] = out[n, 3] = np.nan
             continue
+        i, j, k = math.floor(x + 0.5), math.floor(y + 0.5), math.floor(z + 0.5)
+        bx, by, bz = i >> 3, j >> 3, k >> 3
+        if (bx ^ at_x) | (by ^ at_y) | (bz ^ at_z):
+            at_x, at_y, at_z = bx, by, bz
+            code = find_code(heads, pages, 0, bx, by, bz)
+            slot = slots[code] if code >= 0 else np.int32(ABSENT)
+        if slot >= 0:
+            row, bit = i & 7, ((j & 7) << 3) + (k & 7)
+            if (masks[code, row] >> np.uint64(bit)) & np.uint64(1):
+                r, g, b, a = decode(kind, pool[slot, (row << 6) + bit])
+                out[n, 0], out[n, 1], out[n, 2], out[n, 3] = r, g, b, a
+                continue
         for level in range(top):
             i, j, k = math.floor(x + 0.5), math.floor(y + 0.5), math.floor(z + 0.5)
-            bx, by, bz = i >> 3, j >> 3, k >> 3
-            if level > 0 or (bx ^ at_x) | (by ^ at_y) | (bz ^ at_z):
-                code = find_code(heads, pages, level, bx, by, bz)
-                at_x, at_y, at_z = bx if level == 0 else np.int64(-1 << 62), by, bz
-            e = code
+            e = find_code(heads, pages, level, i >> 3, j >> 3, k >> 3)
             if e <= FIRST_GROUP:
                 e = nearest_sheet(groups, sheets, e, normals[m, 0], normals[m, 1], normals[m, 2])
             if e >= 0 and slots[e] != ABSENT:

@@ -27,8 +27,11 @@ def look_up(
     footprint: Footprint = 0.0,
     *,
     interpolate: bool = True,
+    out: Numbers | None = None,
 ) -> Numbers:
     """(n, 4) float32 that one channel shows at points: see `kernels.texture_lookup`.
+
+    ``out`` is filled if it is given: new memory for millions of colours takes as long as they do.
 
     Raises
     ------
@@ -41,7 +44,7 @@ def look_up(
         raise TextureError(what, "footprint=...", "give widths of 0 or more, world units")
     directions = np.zeros((1, 3)) if normals is None else np.ascontiguousarray(normals)
     points = np.ascontiguousarray(points)
-    out = np.empty((len(points), 4), np.float32)
+    out = np.empty((len(points), 4), np.float32) if out is None else out
     n_pieces = max(-(-len(points) // POINTS_PER_PIECE), n_threads())
     ranges = even_ranges(len(points), min(n_pieces, max(1, len(points) // FEWEST_PER_PIECE)))
 

@@ -74,6 +74,7 @@ def measure(texture, layer, name: str, points: np.ndarray, normals: np.ndarray) 
     kind = texture.channels["base"].kind
     rows = np.linspace(0, len(pool) * 512 - 9, len(points)).astype(np.int64)
     flat = np.zeros((pool.size, 4), np.float32)
+    out = np.empty((len(points), 4), np.float32)
     n_threads, wide = parallel.n_threads, 3 * texture.octree.texel
 
     def lookups(threads: int, interpolate: bool, footprint: float) -> float:
@@ -81,7 +82,7 @@ def measure(texture, layer, name: str, points: np.ndarray, normals: np.ndarray) 
         begin = time.perf_counter()
         look_up(
             texture.octree, layer.slots, pool, tiles, kind, points, normals, footprint,
-            interpolate=interpolate,
+            interpolate=interpolate, out=out,
         )  # fmt: skip
         parallel.n_threads = n_threads
         return time.perf_counter() - begin
