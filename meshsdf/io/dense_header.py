@@ -143,6 +143,13 @@ def told_of(grid: Grid) -> dict[str, str]:
     return {PREFIX + name: str(value) for name, value in facts.items()}
 
 
+def unkept_note(names: Sequence[str], most: int = 20) -> str:
+    """Words for entries of a header that a `Grid` has no place for."""
+    told = [printable(name) for name in sorted(names)]
+    more = f" and {len(told) - most} more" if len(told) > most else ""
+    return f"entries of its header are not kept: {', '.join(told[:most])}{more}"
+
+
 def one_spacing(spacings: Sequence[float]) -> float:
     """The voxel size; UnsuitedError if the spacings differ, ValueError if they make no sense."""
     sizes = [float(size) for size in spacings]

@@ -24,6 +24,7 @@ from .dense_header import (
     numbers_of,
     one_spacing,
     told_of,
+    unkept_note,
     upright_spacings,
 )
 from .detached import data_beside, data_name, written_together
@@ -65,6 +66,18 @@ class _Header:
     is_binary: bool
     is_packed: bool
     notes: tuple[str, ...]
+
+
+_FIELDS = frozenset(
+    {
+        "ObjectType", "NDims", "DimSize", "ElementType", "ElementDataFile",
+        "ElementNumberOfChannels", "BinaryData", "BinaryDataByteOrderMSB", "ElementByteOrderMSB",
+        "CompressedData", "CompressedDataSize", "HeaderSize", "TransformMatrix", "Orientation",
+        "Rotation", "ElementSpacing", "ElementSize", "Offset", "Position", "Origin",
+        "CenterOfRotation", "AnatomicalOrientation",
+    }
+)  # fmt: skip
+"""Fields that are understood, or say nothing beyond those."""
 
 
 def write_metaimage(
@@ -216,7 +229,8 @@ def _understood(fields: dict[str, str], data_at: int) -> _Header:
     if code is None:
         raise ValueError(f"its values are of type '{printable(fields['ElementType'])}'")
     is_big = _flag(fields, "BinaryDataByteOrderMSB", "ElementByteOrderMSB")
-    notes: list[str] = []
+    foreign = [name for name in fields if name not in _FIELDS and not name.startswith(PREFIX)]
+    notes = [unkept_note(foreign)] if foreign else []
     grid = DenseHeader(
         "metaimage",
         np.dtype((">" if is_big else "<") + code),

@@ -23,6 +23,7 @@ from .dense_header import (
     numbers_of,
     one_spacing,
     told_of,
+    unkept_note,
     upright_spacings,
 )
 from .vdb_stream import UnsuitedError, printable
@@ -33,6 +34,10 @@ ENCODINGS = {"gz": "gzip", "bz2": "bzip2", "txt": "text", "ascii": "text"}
 ENCODINGS |= {name: name for name in ("raw", "gzip", "bzip2", "text", "hex")}
 
 _MAGIC = re.compile(rb"NRRD000[1-5]\r?\n")
+OUR_CONTENT = "distance"
+_MEANT = ("content", "labels", "units", "space units", "sample units", "measurement frame")
+"""Fields that tell people something, and that a `Grid` has no place for."""
+
 _OLD_NAMES = {
     "datafile": "data file",
     "lineskip": "line skip",
@@ -103,7 +108,7 @@ def header_text(grid: Grid, encoding: str, data_file: str) -> str:
     step, (x, y, z) = float(grid.voxel_size), grid.origin.tolist()
     lines = [
         "NRRD0005",
-        "content: distance",
+        f"content: {OUR_CONTENT}",
         f"type: {'double' if grid.values.dtype == np.float64 else 'float'}",
         "dimension: 3",
         "space: left-posterior-superior",
@@ -122,7 +127,7 @@ def header_text(grid: Grid, encoding: str, data_file: str) -> str:
 
 
 def _lines(data: bytes, at: int) -> tuple[dict[str, str], dict[str, str], int, bool]:
-    """Fields, keys of ours, the byte behind them, and whether an empty line ends them."""
+    """Fields, keys with values, the byte behind them, and whether an empty line ends them."""
     fields, told = {}, {}
     while (end := data.find(b"\n", at)) >= 0:
         line = data[at:end].rstrip(b"\r").decode("utf-8", "replace")
@@ -135,7 +140,7 @@ def _lines(data: bytes, at: int) -> tuple[dict[str, str], dict[str, str], int, b
         if not colon:
             raise ValueError(f"its header holds the line '{printable(line)}'")
         if value.startswith("="):
-            told |= {name: value[1:].strip()} if name.startswith(PREFIX) else {}
+            told[name] = value[1:].strip()
             continue
         name = name.strip().lower()
         name = _OLD_NAMES.get(name, name)
@@ -157,7 +162,10 @@ def _understood(fields: dict[str, str], told: dict[str, str], data_at: int) -> N
     encoding = ENCODINGS.get(fields["encoding"].lower())
     if encoding is None:
         raise ValueError(f"its encoding is '{printable(fields['encoding'])}'")
-    notes: list[str] = []
+    foreign = [name for name in told if not name.startswith(PREFIX)]
+    foreign += [name for name in _MEANT if name in fields and fields[name] != OUR_CONTENT]
+    notes = [unkept_note(foreign)] if foreign else []
+    told = {name: value for name, value in told.items() if name.startswith(PREFIX)}
     steps = _steps(fields, shape, notes)
     origin = _first(fields, steps, notes)
     stored = _stored(fields, encoding)

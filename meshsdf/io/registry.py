@@ -107,6 +107,7 @@ FORMATS = (
     _volume("OpenEXR", (".exr",), "exr", _IMAGES, has_warnings=True),
     Format(
         *("Zarr", (".zarr",), "volume", "zarr_volume", "read_zarr", "write_zarr", "probe_zarr"),
+        has_warnings=True,
         marker="zarr.json",
         holds=_SPARSE | {"double", "hermite"},
     ),

@@ -34,6 +34,7 @@ from .registry import checked_input, stored_bytes
 from .unpacking import check_claim
 from .vdb_stream import UnsuitedError, printable
 from .volume_checks import check_index, check_volume
+from .warn import Warn, ignore
 from .zarr_array import ArraySpec, read_metadata, read_spec, read_whole, write_group, write_rows
 from .zarr_ome import ome_attributes, placed_array
 from .zarr_values import brick_box, read_band_values, write_band_values, write_grid_values
@@ -45,7 +46,12 @@ _HALF, _FLOAT = np.dtype("<f2"), np.dtype("<f4")
 
 
 def write_zarr(
-    path: str | os.PathLike, volume: NarrowBand | Grid, *, half: bool = False, force: bool = False
+    path: str | os.PathLike,
+    volume: NarrowBand | Grid,
+    *,
+    half: bool = False,
+    force: bool = False,
+    warn: Warn = ignore,
 ) -> None:
     """Write a volume; every field reads back bit-equal, values too unless ``half``.
 
@@ -59,6 +65,8 @@ def write_zarr(
         Round values to float16; see `write_npz`.
     force : bool
         Replace an existing folder, if it is a Zarr one.
+    warn : callable
+        Never called: nothing is lost. Other formats have something to say.
 
     Raises
     ------
@@ -84,8 +92,15 @@ def write_zarr(
         raise IoError(f"the volume cannot be written: {error}", where, "build it anew") from error
 
 
-def read_zarr(path: str | os.PathLike) -> NarrowBand | Grid:
+def read_zarr(path: str | os.PathLike, *, warn: Warn = ignore) -> NarrowBand | Grid:
     """Read a volume that `write_zarr` wrote, or the finest level of an OME-Zarr image.
+
+    Parameters
+    ----------
+    path : path
+        The folder.
+    warn : callable
+        Told of attributes that a volume has no place for.
 
     Raises
     ------
@@ -110,6 +125,8 @@ def read_zarr(path: str | os.PathLike) -> NarrowBand | Grid:
             build = _band if small["format"] == BAND else _grid
             volume = build(folder / VALUES, small | large, specs["values"], n_there)
         check_volume(volume)
+    if foreign := sorted(attributes.keys() - {"meshsdf", "ome"}):
+        warn(f"attributes are not kept: {', '.join(map(printable, foreign[:20]))}")
     return volume
 
 

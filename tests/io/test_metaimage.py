@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from meshsdf.errors import IoError
 from meshsdf.grid import Grid
-from meshsdf.io.metaimage import probe_metaimage, read_metaimage
+from meshsdf.io.metaimage import probe_metaimage, read_metaimage, write_metaimage
 from tests.io.dense_examples import WAYS, assert_centered, sphere_grid, written
 
 META_WAYS = ["mha", "mha plain", "mhd", "mhd plain"]
@@ -185,3 +185,12 @@ def test_odd_headers_are_refused(tmp_path):
         read(path, b"what\n" + whole)
     with pytest.raises(IoError, match="does not end with ElementDataFile"):
         read(path, b"NDims = 3\n")
+
+
+def test_entries_that_are_not_kept_are_named(tmp_path):
+    path = tmp_path / "noted.mha"
+    write_metaimage(path, Grid(np.zeros((3, 4, 5), np.float32), 0.5, np.zeros(3)))
+    path.write_bytes(path.read_bytes().replace(b"NDims", b"Comment = a scan\nNDims", 1))
+    said = []
+    read_metaimage(path, warn=said.append)
+    assert said == ["entries of its header are not kept: Comment"]

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from meshsdf.errors import IoError
 from meshsdf.grid import Grid
-from meshsdf.io.nrrd import probe_nrrd, read_nrrd
+from meshsdf.io.nrrd import probe_nrrd, read_nrrd, write_nrrd
 from tests.io.dense_examples import WAYS, assert_centered, assert_same_grid, sphere_grid, written
 
 NRRD_WAYS = ["nrrd", "nrrd plain", "nhdr", "nhdr plain"]
@@ -270,3 +270,15 @@ def test_odd_headers_are_refused(tmp_path):
     inf[0, 0, 0] = np.inf
     with pytest.raises(IoError, match="values are infinite"):
         read(path, nrrd_bytes(packed("<f4", inf)))
+
+
+def test_entries_that_are_not_kept_are_named(tmp_path):
+    path = tmp_path / "noted.nrrd"
+    write_nrrd(path, Grid(np.zeros((3, 4, 5), np.float32), 0.5, np.zeros(3)))
+    data = path.read_bytes().replace(
+        b"\nendian:", b'\nunits: "mm" "mm" "mm"\npatient:=nobody\nendian:', 1
+    )
+    path.write_bytes(data.replace(b"content: distance", b"content: a scan", 1))
+    said = []
+    read_nrrd(path, warn=said.append)
+    assert said == ["entries of its header are not kept: content, patient, units"]

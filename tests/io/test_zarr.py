@@ -2,6 +2,7 @@
 
 import dataclasses
 import errno
+import json
 import os
 import shutil
 import sys
@@ -369,3 +370,15 @@ def test_images_that_make_no_grid_are_refused_with_a_reason(tmp_path):
     for options, words in cases:
         with pytest.raises(IoError, match=words):
             read_zarr(foreign(path, **options))
+
+
+def test_attributes_that_are_not_kept_are_named(tmp_path):
+    path = tmp_path / "noted.zarr"
+    write_zarr(path, Grid(np.zeros((3, 4, 5), np.float32), 0.5, np.zeros(3)))
+    head = path / "zarr.json"
+    told = json.loads(head.read_text())
+    told["attributes"] |= {"microscope": "none", "author": "nobody"}
+    head.write_text(json.dumps(told))
+    said = []
+    read_zarr(path, warn=said.append)
+    assert said == ["attributes are not kept: author, microscope"]
