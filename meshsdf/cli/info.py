@@ -10,7 +10,11 @@ from .options import json_option, path
 @click.argument("file", type=path)
 @json_option
 def command(file: str, as_json: bool) -> int:
-    """What is in FILE: a mesh, a volume or samples, these two from their headers."""
+    """What is in FILE: a mesh, a texture, a volume or samples, these two from their headers."""
+    if file.lower().endswith(".mtex"):
+        from .texture_out import info
+
+        return click.get_current_context().invoke(info, texture=file, as_json=as_json)
     console = Console("info", as_json=as_json)
     from ..io import check_input, kind_of, probe_samples, probe_volume, stored_bytes
 

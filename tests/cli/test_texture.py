@@ -56,6 +56,7 @@ def test_a_solid_texture_is_made_and_told(cli, mesh, tmp_path):
     told = cli("texture", "info", out, "--json").json
     assert told["n_texels"] == facts["n_texels"]
     assert "2 operations" in cli("texture", "info", out).out
+    assert cli("info", out).out == cli("texture", "info", out).out
     again = cli("texture", "procedural", mesh, out, *options)
     assert again.code == 3
     assert "exists" in again.err

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from meshsdf.errors import TextureError
+from meshsdf.io import read_mesh
 from meshsdf.kernels.uv_raster import NO_FACE, draw_faces
 from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere
@@ -16,6 +17,7 @@ from meshsdf.texture.mesh_source import MeshSource
 from meshsdf.texture.mip import bake
 from meshsdf.texture.procedural import procedural
 from meshsdf.texture.volume_texture import VolumeTexture
+from tests.models import model, needs_models
 
 
 def baked(mesh: Mesh, function, resolution: int = 64) -> VolumeTexture:
@@ -166,3 +168,18 @@ def test_thin_plates_take_each_side_from_its_own_face():
     places = np.array([[0.3, 0.4, 0.004], [0.3, 0.4, 0.0]])
     normals = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
     assert texture.colors(places, normals).tolist() == [[1, 0, 0, 1], [0, 0, 1, 1]]
+
+
+@needs_models
+@pytest.mark.parametrize("name", ["spot.obj", "fuze.obj"])
+def test_an_image_comes_back_through_space(name):
+    mesh = read_mesh(model(name))
+    image = mesh.materials[0].image[..., :3]
+    texture = baked(mesh, MeshSource(mesh), 1024)
+    size = len(image)
+    again = textured(texture, atlas_for(mesh, size, "own")).materials[0].image[..., :3]
+    shown = np.full((size, size), NO_FACE, np.int32)
+    corners = np.stack([size * mesh.uv[:, 0], size * (1 - mesh.uv[:, 1])], axis=1)
+    draw_faces(corners, mesh.faces, size, size, 0.0, shown, np.empty((size, size, 2), np.float32))
+    error = (image.astype(float) - again)[shown != NO_FACE]
+    assert 10 * np.log10(255**2 / (error**2).mean()) > 38
