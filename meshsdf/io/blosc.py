@@ -4,7 +4,7 @@ OpenVDB packs with LZ4, which `kernels.blosc_frames` opens; frames of other code
 packing, need the package numcodecs, which is imported here and nowhere else.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -12,8 +12,10 @@ import numpy as np
 from ..arrays import writable_alias
 from ..errors import IoError
 from ..kernels.blosc_frames import DAMAGED, OTHER, open_frames
+from ..kernels.parallel import even_ranges, run_pieces
 from .vdb_stream import UnsuitedError
 
+FRAMES_PER_TASK = 1024
 PIP_LINE = "pip install 'meshsdf[blosc]'"
 
 
@@ -25,11 +27,12 @@ def require_blosc(where: str) -> None:
         raise IoError("packing with Blosc needs the package numcodecs", where, error.fix) from None
 
 
-def blosc_encode(data: memoryview, width: int) -> bytes:
-    """Pack values of ``width`` bytes as OpenVDB does: LZ4 on shuffled bytes."""
+def blosc_encoder(width: int) -> Callable[[memoryview], bytes]:
+    """What packs values of ``width`` bytes as OpenVDB does: LZ4 on shuffled bytes."""
     codec = _codec()
-    values = np.frombuffer(data, f"V{width}")  # Blosc takes the size of a value from its type
-    return codec.compress(values, b"lz4", 9, codec.SHUFFLE)
+    compress, shuffle = codec.compress, codec.SHUFFLE
+    type_ = np.dtype(f"V{width}")  # Blosc takes the size of a value from its type
+    return lambda data: compress(np.frombuffer(data, type_), b"lz4", 9, shuffle)
 
 
 @contextmanager
@@ -60,8 +63,15 @@ def blosc_decode(window: bytes, frames: list[tuple[int, int]], sizes: list[int])
     target = np.empty(int(ends[-1]), np.uint8)
     states = np.empty(len(frames), np.uint8)
     source = writable_alias(np.frombuffer(window, np.uint8))
-    scratch = np.empty(max(sizes), np.uint8)
-    open_frames(source, np.array(frames, np.int64), target, places, scratch, states)
+    spans, room = np.array(frames, np.int64), max(sizes)
+    ranges = even_ranges(len(frames), len(frames) // FRAMES_PER_TASK + 1)
+
+    def work(task: int) -> None:
+        part = slice(*ranges[task])
+        scratch = np.empty(room, np.uint8)
+        open_frames(source, spans[part], target, places[part], scratch, states[part])
+
+    run_pieces(work, len(ranges))
     if (states == DAMAGED).any():
         worst = int(np.argmax(states == DAMAGED))
         raise ValueError(f"a Blosc frame for {sizes[worst]} bytes is damaged")

@@ -153,6 +153,8 @@ def _unpacked(window: bytes, records: NodeRecords, layout: ValueLayout) -> bytes
     if layout.flags & BLOSC:
         packed = [(span, size) for span, size, is_packed in parts if is_packed]
         opened = blosc_decode(window, [span for span, _ in packed], [size for _, size in packed])
+        if len(packed) == len(sizes):
+            return opened
         at, pieces = 0, []
         for (a, b), size, is_packed in zip(spans, sizes, records.is_packed, strict=True):
             pieces.append(opened[at : at + size] if is_packed else window[a:b])

@@ -2,11 +2,12 @@
 
 import struct
 import zlib
+from collections.abc import Callable
 
 import numpy as np
 
 from ..kernels.parallel import even_ranges, run_pieces
-from .blosc import blosc_encode, without_blosc_threads
+from .blosc import blosc_encoder, without_blosc_threads
 from .half import halved
 from .vdb_values import ACTIVE_MASK, BLOSC, FULL, ValueLayout, full_width, same_bits
 
@@ -49,26 +50,24 @@ def _all_packed(pieces: list[memoryview], layout: ValueLayout) -> list[bytes]:
     """The data of many nodes behind their sizes; zlib lets other threads run."""
     if layout.flags & BLOSC:  # so quick that threads would wait for each other
         with without_blosc_threads():
-            return [_packed(piece, layout) for piece in pieces]
+            encode = blosc_encoder(layout.stored_width)
+            return [_packed(piece, layout, encode) for piece in pieces]
     packed = [b""] * len(pieces)
     ranges = even_ranges(len(pieces), len(pieces) // NODES_PER_TASK + 1)
 
     def work(task: int) -> None:
         for n in range(*ranges[task]):
-            packed[n] = _packed(pieces[n], layout)
+            packed[n] = _packed(pieces[n], layout, zlib.compress)
 
     run_pieces(work, len(ranges))
     return packed
 
 
-def _packed(piece: memoryview, layout: ValueLayout) -> bytes:
+def _packed(piece: memoryview, layout: ValueLayout, encode: Callable[[memoryview], bytes]) -> bytes:
     """A node's data behind their size."""
     if not piece:
         return b"" if layout.is_half else bytes(8)
-    if layout.flags & BLOSC:
-        packed = blosc_encode(piece, layout.stored_width)
-    else:
-        packed = zlib.compress(piece)
+    packed = encode(piece)
     if len(packed) < len(piece):
         return struct.pack("<q", len(packed)) + packed
     return struct.pack("<q", -len(piece)) + piece
