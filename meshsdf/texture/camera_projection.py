@@ -17,7 +17,7 @@ from ..arrays import Number, Points, Points2, Values, Vector3
 from ..errors import TextureError
 from ..mesh import Mesh
 from ..spatial.ray_hits import RayHits
-from .projection import Gradients, Projection, Reached, check_positive, toward
+from .projection import Gradients, Mapped, Reached, check_positive, toward
 
 OWN = 2.0  # texels from a point within which what the ray meets is the point's own surface
 SHORTEST = 0.25  # texels: the shortest step, and the thinnest wall that is sure to be met
@@ -30,7 +30,7 @@ def _upward() -> Vector3:
 
 
 @dataclass(frozen=True, eq=False)
-class CameraProjection(Projection):
+class CameraProjection(Mapped):
     """From an eye: every point in view gets what the picture shows there.
 
     Attributes

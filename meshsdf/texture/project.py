@@ -15,6 +15,7 @@ from .image import Colors
 from .projection import (
     Gradients,
     Linear,
+    Mapped,
     Projection,
     Reached,
     Width,
@@ -29,7 +30,7 @@ NEAREST = 1e-150  # to an axis or a center that gradients are taken at; squares 
 
 
 @dataclass(frozen=True, eq=False)
-class Planar(Projection):
+class Planar(Mapped):
     """Along z, through everything: u = x / width, v = y / height.
 
     Attributes
@@ -67,7 +68,7 @@ class Planar(Projection):
 
 
 @dataclass(frozen=True, eq=False)
-class Cylindrical(Projection):
+class Cylindrical(Mapped):
     """Around z: u = angle / 2 pi from the x axis towards y, v = z / height.
 
     Attributes
@@ -103,7 +104,7 @@ class Cylindrical(Projection):
 
 
 @dataclass(frozen=True, eq=False)
-class Spherical(Projection):
+class Spherical(Mapped):
     """From the center: u = longitude / 2 pi from x towards y, v = 1/2 + latitude / pi.
 
     The image's lower border is the pole at -z, its upper one that at +z. At a pole, and in the
@@ -195,7 +196,7 @@ class Triplanar(Projection):
 
 
 @dataclass(frozen=True, eq=False)
-class Decal(Projection):
+class Decal(Mapped):
     """A sticker: along z within a box around the origin, upright and unmirrored seen from +z.
 
     Attributes

@@ -10,6 +10,7 @@ along u is its diameter times the length of the gradient of u, less the part alo
 v likewise (first order). The gradients are formulas too, so that nothing widens where u jumps.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -36,7 +37,7 @@ def _identity() -> Matrix4:
 
 
 @dataclass(frozen=True, eq=False)
-class Projection:
+class Projection(ABC):
     """An image laid over space: ``f(points, normals=None, footprint=0.0) -> colours``.
 
     Attributes
@@ -133,6 +134,29 @@ class Projection:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         return normals / np.where(length > 0, length, 1.0)
 
+    def _wraps(self) -> tuple[str, str]:
+        """What lies beyond the image's borders."""
+        return ("repeat", "repeat")
+
+    @abstractmethod
+    def _colors(
+        self,
+        local: Points,
+        normals: Points | None,
+        facing: Points | None,
+        linear: Linear,
+        width: Width,
+    ) -> Colors:
+        """Colours at points of texture space, on the caller's thread alone."""
+
+    def _reached(self, local: Points, facing: Points | None) -> Reached:
+        """Which points get colour; None for all. ``facing``: normals there, of any length."""
+        return None
+
+
+class Mapped(Projection):
+    """A projection that has texture coordinates (u, v) at every point."""
+
     def _colors(
         self,
         local: Points,
@@ -148,25 +172,17 @@ class Projection:
             widths = np.minimum(widths, self._widest())
         return look(self.image, self._uv(local), widths, self._wraps())
 
+    @abstractmethod
     def _uv(self, local: Points) -> Points2:
         """Texture coordinates of points of texture space."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _gradients(self, local: Points) -> Gradients:
         """How u and v grow in texture space: for each point, or once for all."""
-        raise NotImplementedError
-
-    def _wraps(self) -> tuple[str, str]:
-        """What lies beyond the image's borders."""
-        return ("repeat", "repeat")
 
     def _widest(self) -> tuple[float, float]:
         """What no footprint exceeds along u and v."""
         return (np.inf, np.inf)
-
-    def _reached(self, local: Points, facing: Points | None) -> Reached:
-        """Which points get colour; None for all. ``facing``: normals there, of any length."""
-        return None
 
 
 def stretch(gradients: Gradients, normals: Points | None) -> Float64[np.ndarray, "lengths 2"]:

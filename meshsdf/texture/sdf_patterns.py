@@ -6,6 +6,7 @@ negative inside: an `Implicit`, an interpolated grid, or
 for any function with that zero set; occlusion and thickness want distances, or bounds of them.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -27,7 +28,7 @@ CLOSE = 1e-9  # of the largest thickness: near enough to the far side
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _OnShape:
+class _OnShape(ABC):
     """A texture of two colours, the second by a weight that the shape gives."""
 
     distance: SignedDistance
@@ -41,12 +42,13 @@ class _OnShape:
         first, second = self._color_pair()
         return straight(blend(first, second, self.weight(points, widths)))
 
+    @abstractmethod
     def weight(self, points: Points, footprint: Number | Values = 0.0) -> Values:
         """Return the share of the second colour, (n,) in [0, 1]; also a weight for `mix`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _color_pair(self) -> tuple[np.ndarray, np.ndarray]:
-        raise NotImplementedError
+        """The two colours, linear, multiplied by alpha."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

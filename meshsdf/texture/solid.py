@@ -6,6 +6,7 @@ a wide filter the cube is cut into k^3 smaller ones and their colours are averag
 cuts can tell, that mean is taken.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import ClassVar
@@ -29,7 +30,7 @@ MEAN_POINTS = 1 << 17  # random, so that the mean is known to 1/360 of the contr
 
 
 @dataclass(frozen=True, kw_only=True)
-class Solid:
+class Solid(ABC):
     """A texture of all space: ``texture(points, footprint=0.0)`` gives colours.
 
     Points are divided by ``scale`` first, so that it is the length of the pattern's unit.
@@ -73,13 +74,13 @@ class Solid:
         run_pieces(piece, -(-len(points) // POINTS_PER_PIECE))
         return colors
 
+    @abstractmethod
     def _colors(self, points: Points, width: Values) -> Rgba:
         """Colours right for cubes that are small beside the features; all in pattern units."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _cuts(self, points: Points, width: Values) -> Values:
         """Into how many cubes along each axis a cube is better cut."""
-        raise NotImplementedError
 
     def _coarsest(self) -> float:
         """Size of the largest feature of a pattern that is alike everywhere; else infinite."""
