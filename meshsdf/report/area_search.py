@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from ..arrays import Values
+from ..arrays import Number, Values
 from ..kernels.graph_distance import ANGLE, D_LOW, MAX_ANGLE, S_LOW
 from ..mesh import Mesh
 from ..progress import Progress
@@ -34,10 +34,16 @@ class AreaSearch:
     """
 
     def __init__(
-        self, source: Mesh, target: Mesh, tolerance: Tolerance, progress: Progress
+        self,
+        source: Mesh,
+        target: Mesh,
+        tolerance: Tolerance,
+        progress: Progress,
+        *,
+        at_most: Number = np.inf,
     ) -> None:
         self.tolerance = tolerance
-        self.ruler = Ruler(source, target)
+        self.ruler = Ruler(source, target, at_most)
         pieces = self.ruler.pieces_of(source, progress)
         self.area = float(pieces.areas.sum())
         sides = np.abs(pieces.corners[:, [1, 2, 0]] - pieces.corners).sum(axis=(1, 2))
@@ -79,7 +85,8 @@ class AreaSearch:
     def largest(self) -> float:
         """No point is farther."""
         spans = (self.spans[:, 1], self.bounds.span[:, 1])
-        return max(float(span.max(initial=0.0)) for span in spans) + self.ruler.rounding
+        seen = max(float(span.max(initial=0.0)) for span in spans)
+        return min(seen + self.ruler.rounding, self.ruler.at_most)
 
     @property
     def excess(self) -> Float64[np.ndarray, "2"]:

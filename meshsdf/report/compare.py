@@ -199,8 +199,8 @@ def compare(
     found = hausdorff(a, b, means=is_flat or not statistics, **limits)
     forward = backward = None
     if statistics:
-        forward = _statistics(a, b, voxel_size, progress)
-        backward = _statistics(b, a, voxel_size, progress)
+        forward = _statistics(a, b, found.forward, voxel_size, progress)
+        backward = _statistics(b, a, found.backward, voxel_size, progress)
     return Comparison(
         found.distance,
         _with_means(found.forward, forward),
@@ -215,11 +215,13 @@ def compare(
 
 
 def _statistics(
-    source: Mesh, target: Mesh, voxel_size: float | None, progress: Progress
+    source: Mesh, target: Mesh, side: OneSided, voxel_size: float | None, progress: Progress
 ) -> Statistics | None:
     if area(source) == 0:
         return None
-    return one_sided_statistics(source, target, voxel_size=voxel_size, progress=progress)
+    return one_sided_statistics(
+        source, target, at_most=side.distance.upper, voxel_size=voxel_size, progress=progress
+    )
 
 
 def _with_means(side: OneSided, found: Statistics | None) -> OneSided:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int32
 
-from ..arrays import Points, Values, writable_alias
+from ..arrays import Number, Points, Values, writable_alias
 from ..kernels.distance_integrals import finish_shares, linear_shares, linear_sums
 from ..kernels.graph_distance import ANGLE, MAX_ANGLE, SETTLED, UNKNOWN, graph_measures
 from ..kernels.graph_shadows import CLOSED, LONE, OPEN, SHRUNK
@@ -118,9 +118,13 @@ class Bounds:
 
 
 class Ruler:
-    """A target, ready to bound distances of pieces; counts what it does in ``n_evaluations``."""
+    """A target, ready to bound distances of pieces; counts what it does in ``n_evaluations``.
 
-    def __init__(self, source: Mesh, target: Mesh) -> None:
+    No distance of the source is larger than ``at_most``.
+    """
+
+    def __init__(self, source: Mesh, target: Mesh, at_most: Number = np.inf) -> None:
+        self.at_most = float(at_most)
         self.closest = ClosestPoint(target)
         used = np.zeros(source.n_vertices, np.bool_)
         used[source.faces] = True
@@ -193,6 +197,8 @@ class Ruler:
             linear_sums(lower, upper, pieces.areas, begin, end, sums, span)
 
         run_pieces(work, len(tasks))
+        most = np.multiply.outer(pieces.areas, [self.at_most, self.at_most**2])
+        sums[:, [1, 3]] = np.maximum(np.fmin(sums[:, [1, 3]], most), sums[:, [0, 2]])
         angles = self._angles(pieces, slots[:, 3])
         sums[:, ANGLE], sums[:, MAX_ANGLE] = pieces.areas * angles, angles
         return Bounds(np.zeros(k, np.bool_), sums, span, lower, upper)

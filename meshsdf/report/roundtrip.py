@@ -294,9 +294,9 @@ class _Work:
             if i in finest:
                 if band is None or band.voxel_size != row.voxel_size:
                     band = mesh_to_band(self.mesh, resolution=row.resolution, **self.options)
-                found = row_details(shapes[0], band, shapes[1], progress=progress)
+                found = row_details(shapes[0], band, shapes[1], row.comparison, progress=progress)
             else:
-                found = coarse_details(*shapes, row.voxel_size, progress=progress)
+                found = coarse_details(*shapes, row.comparison, row.voxel_size, progress=progress)
             seconds = row.seconds | {"details": round(time.perf_counter() - begin, 4)}
             rows[i] = replace(row, details=found, seconds=seconds)
 

@@ -11,8 +11,10 @@ from ..mesh import Mesh
 from ..mesh.measures import area
 from ..progress import Progress, silent
 from ..surface import default_level
+from .compare import Comparison
 from .conditioning import Conditioning, conditioning
 from .error_budget import ErrorBudget, error_budget
+from .hausdorff import OneSided
 from .sharp_edges import SharpEdges, sharp_edges
 from .statistics import Statistics, one_sided_statistics
 from .tolerance import Tolerance
@@ -55,29 +57,42 @@ class RowDetails:
 
 
 def coarse_details(
-    mesh: Mesh, surface: Mesh, voxel_size: Number, *, progress: Progress = silent
+    mesh: Mesh,
+    surface: Mesh,
+    found: Comparison,
+    voxel_size: Number,
+    *,
+    progress: Progress = silent,
 ) -> RowDetails:
     """Measure what the table of all rows shows: how distances are spread over the mesh."""
-    return RowDetails(_statistics(mesh, surface, voxel_size, progress))
+    return RowDetails(_statistics(mesh, surface, found.forward, voxel_size, progress))
 
 
 def row_details(
-    mesh: Mesh, band: NarrowBand, surface: Mesh, *, progress: Progress = silent
+    mesh: Mesh,
+    band: NarrowBand,
+    surface: Mesh,
+    found: Comparison,
+    *,
+    progress: Progress = silent,
 ) -> RowDetails:
-    """Measure them for a surface with faces that was extracted from a band of the mesh."""
+    """Measure them for a surface with faces that was extracted from a band of the mesh.
+
+    ``found`` is how far the two are apart.
+    """
     tolerance = BUDGET_SHARE * band.voxel_size
     level, _ = default_level(band)
     budget = error_budget(mesh, band, surface, level=level, tolerance=tolerance, progress=progress)
     edges = sharp_edges(
         mesh, surface, voxel_size=band.voxel_size, tolerance=tolerance, progress=progress
     )
-    sides = (mesh, surface), (surface, mesh)
+    sides = (mesh, surface, found.forward), (surface, mesh, found.backward)
     spread = [_statistics(*pair, band.voxel_size, progress) for pair in sides]
     return RowDetails(*spread, budget, conditioning(band, level), edges)
 
 
 def _statistics(
-    source: Mesh, target: Mesh, voxel_size: Number, progress: Progress
+    source: Mesh, target: Mesh, side: OneSided, voxel_size: Number, progress: Progress
 ) -> Statistics | None:
     if area(source) == 0:
         return None
@@ -87,6 +102,7 @@ def _statistics(
         target,
         tolerance=tolerance,
         max_evaluations=max(MOST_EVALUATIONS, 8 * source.n_faces),
+        at_most=side.distance.upper,
         voxel_size=voxel_size,
         progress=progress,
     )

@@ -99,6 +99,7 @@ def one_sided_statistics(
     *,
     tolerance: Number | Tolerance | None = None,
     max_evaluations: int | None = None,
+    at_most: Number = np.inf,
     percentiles: Sequence[Number] = PERCENTILES,
     voxel_size: Number | None = None,
     progress: Progress = silent,
@@ -113,8 +114,10 @@ def one_sided_statistics(
         Width asked of the enclosures of mean and rms: a length in world units, or a `Tolerance`.
         By default 1e-2 of each, or 1e-6 of the target's diagonal where that is more.
     max_evaluations : int, optional
-        Closest points and bounds after which nothing is cut any more; by default 200,000, or 4
+        Closest points and bounds after which nothing is cut any more; by default 1,000,000, or 4
         per face of the source where that is more. All faces are always bounded once.
+    at_most : float
+        What no point of the source is farther away than, if that is known; world units.
     percentiles : sequence of float
         Percentages above 0, up to 100.
     voxel_size : float, optional
@@ -151,13 +154,13 @@ def one_sided_statistics(
     >>> print(found.mean, found.rms)  # sqrt(25 / 6)
     [1.99999, 2.00001] [2.04124, 2.04125]
     """
-    _check(source, target, percentiles, voxel_size)
+    _check(source, target, percentiles, voxel_size, at_most)
     if tolerance is None:
         shortest = DIAGONAL_TOLERANCE * target.box.diagonal
         tolerance = Tolerance(absolute=shortest, relative=RELATIVE_TOLERANCE)
     if max_evaluations is None:
-        max_evaluations = max(200_000, 4 * source.n_faces)
-    search = AreaSearch(source, target, Tolerance.of(tolerance), progress)
+        max_evaluations = max(1_000_000, 4 * source.n_faces)
+    search = AreaSearch(source, target, Tolerance.of(tolerance), progress, at_most=at_most)
     lost = ()
     if voxel_size is not None:
         lost = parts_of(source, search.ruler, search.all_pieces(), voxel_size)
@@ -183,9 +186,10 @@ def _result(
     rounding, slack = search.ruler.rounding, search.area_rounding
     ends = search.sums[:4] / search.area
     low, high = np.maximum(ends[[0, 2]] * (1.0 - slack), 0.0), ends[[1, 3]] * (1.0 + slack)
-    mean = Enclosure(max(float(low[0]) - rounding, 0.0), float(high[0]) + rounding)
-    roots = np.sqrt([low[1], high[1]])
-    rms = Enclosure(max(float(roots[0]) - rounding, 0.0), float(roots[1]) + rounding)
+    low[1], high[1] = np.sqrt([low[1], high[1]])
+    low = np.maximum(low - rounding, 0.0)
+    high = np.maximum(np.minimum(high + rounding, search.ruler.at_most), low)
+    mean, rms = (Enclosure(float(a), float(b)) for a, b in zip(low, high, strict=True))
     joined = welded(source), welded(target)
     is_closed = [is_watertight(mesh) for mesh in joined]
     angles = np.degrees(search.angle)
@@ -237,7 +241,11 @@ def _part_json(part: LostPart) -> dict:
 
 
 def _check(
-    source: Mesh, target: Mesh, percentiles: Sequence[Number], voxel_size: Number | None
+    source: Mesh,
+    target: Mesh,
+    percentiles: Sequence[Number],
+    voxel_size: Number | None,
+    at_most: Number,
 ) -> None:
     for mesh, name in ((source, "source"), (target, "target")):
         if mesh.n_faces == 0:
@@ -249,6 +257,9 @@ def _check(
         fix = "compare a mesh with area, or ask for one_sided_hausdorff"
         raise ReportError(what, "one_sided_statistics(source=...)", fix)
     check_percents(percentiles)
+    if not at_most >= 0:
+        what = f"no point is said to be farther than {at_most:g}"
+        raise ReportError(what, "one_sided_statistics(at_most=...)", "pass a length of 0 or more")
     if voxel_size is not None and not voxel_size > 0:
         what = f"the voxel size is {voxel_size:g}"
         raise ReportError(what, "one_sided_statistics(voxel_size=...)", "pass a positive length")

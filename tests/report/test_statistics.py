@@ -10,6 +10,7 @@ from meshsdf import marching_cubes, mesh_to_band
 from meshsdf.errors import ReportError
 from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere
+from meshsdf.report.hausdorff import one_sided_hausdorff
 from meshsdf.report.lost_parts import lost_parts
 from meshsdf.report.statistics import one_sided_statistics
 from meshsdf.report.tolerance import Tolerance
@@ -98,6 +99,20 @@ def assert_holds(found, distances):
     assert (shares.lower <= seen + error).all()
     assert (shares.upper >= near - error).all()
     assert shares.lower[-1] == 1
+
+
+def test_nothing_is_said_to_be_farther_than_the_largest_distance():
+    plate = box_mesh((4.0, 4.0, 0.1))
+    target = rough(icosphere(subdivisions=3), 0.02, seed=5)
+    most = one_sided_hausdorff(plate, target).distance.upper
+    loose = one_sided_statistics(plate, target, max_evaluations=1)
+    found = one_sided_statistics(plate, target, max_evaluations=1, at_most=most)
+    ends = [found.mean.upper, found.rms.upper, *(t.upper for t in found.percentiles.values())]
+    assert max(ends) <= most
+    assert loose.rms.upper > most  # or the limit would not have been needed
+    assert found.rms.lower == loose.rms.lower
+    assert found.shares.thresholds[-1] <= max(most, loose.shares.thresholds[-1])
+    assert_holds(found, sampled(plate, target, 20_000, seed=6)[0])
 
 
 def heights(*values):
