@@ -9,9 +9,6 @@ from .console import YES, Console, file_size
 from .options import PositiveNumber, force_option, json_option, path
 from .texture_make import texture_facts, texture_words
 
-PICTURES = (".png", ".jpg", ".jpeg", ".exr")
-VOLUMES = (".vdb",)
-
 
 def laid_options(function: Callable) -> Callable:
     """How a mesh is laid out on an image."""
@@ -55,8 +52,8 @@ def apply(texture: str, mesh: str, out: str, at_vertices, size, atlas, time_limi
     """
     console = Console("texture-apply", as_json=as_json)
     console.watch_compilation()
-    from ..io import check_input, read_mesh, write_mesh
-    from ..io.atomic import check_output
+    from ..io import check_input, check_output, read_mesh, write_mesh
+    from ..io.texture_files import Layout, colored_mesh, words_of
     from ..texture.journal import Project
 
     check_input(mesh, kind="mesh")
@@ -65,13 +62,14 @@ def apply(texture: str, mesh: str, out: str, at_vertices, size, atlas, time_limi
         loaded = read_mesh(mesh, warn=console.warn)
         project = Project.open(texture, warn=console.warn)
     with project, console.stage("colours"):
-        colored, facts = _colored(
-            project.texture, loaded, out, at_vertices, size, atlas, time_limit, console
+        layout = Layout(size, atlas, time_limit)
+        colored, facts = colored_mesh(
+            project.texture, loaded, out, at_vertices=at_vertices, layout=layout, warn=console.warn
         )
     with console.stage("write"):
         write_mesh(out, colored, force=force)
     seconds = console.timings("load", "colours", "write")
-    console.result(f"{out}: {_laid_words(facts)}, {seconds['total']:.2f} s")
+    console.result(f"{out}: {words_of(facts)}, {seconds['total']:.2f} s")
     head = {"texture": texture, "input": mesh, "output": out}
     console.json(head | facts | {"seconds": seconds, "warnings": console.warnings})
     return YES
@@ -106,14 +104,11 @@ def export(
     """Write what TEXTURE (.mtex) shows on its own mesh."""
     console = Console("texture-export", as_json=as_json)
     console.watch_compilation()
-    from ..io.atomic import check_output
+    from ..io.texture_files import Layout, check_texture_output, words_of, write_texture
     from ..texture.journal import Project
 
     for out in outputs:
-        suffix = Path(out).suffix.lower()
-        check_output(out, force, kind=None if suffix in (*PICTURES, *VOLUMES) else "mesh")
-        if suffix in PICTURES:
-            check_output(_mesh_beside(out), force)
+        check_texture_output(out, force)
     with console.stage("load"):
         project = Project.open(texture, warn=console.warn)
     written = []
@@ -124,11 +119,11 @@ def export(
             mesh = _displaced(shown, mesh, resolution, console)
         for out in outputs:
             with console.stage("export"):
-                options = (size, atlas, time_limit, channel, force, console)
-                facts = _write(shown, mesh, out, *options)
+                options = {"layout": Layout(size, atlas, time_limit), "channel": channel}
+                facts = write_texture(out, shown, mesh, **options, force=force, warn=console.warn)
             n_bytes = Path(out).stat().st_size
             written.append({"output": out, "bytes": n_bytes} | facts)
-            console.result(f"{out}: {_laid_words(facts)}, {file_size(n_bytes)}", is_last=False)
+            console.result(f"{out}: {words_of(facts)}, {file_size(n_bytes)}", is_last=False)
     seconds = console.timings("load", "export")
     facts = {"input": texture, "written": written, "seconds": seconds}
     console.json(facts | {"warnings": console.warnings})
@@ -159,50 +154,6 @@ def info(texture: str, as_json: bool) -> int:
     return YES
 
 
-def _colored(texture, mesh, out, at_vertices, size, method, time_limit, console):
-    """The mesh with a texture's colours as the format can have them, and how that was done."""
-    from ..texture.atlas import atlas_for, textured, vertex_colored
-
-    suffix = Path(out).suffix.lower()
-    if at_vertices is None:
-        at_vertices = suffix == ".ply"
-    if suffix in (".stl", ".off"):
-        console.warn(f"{suffix} files hold no colours")
-        return mesh, {"colors": "none"}
-    if at_vertices:
-        return vertex_colored(texture, mesh), {"colors": "vertices"}
-    laid = atlas_for(mesh, size, method, time_limit=time_limit)
-    facts = {"colors": "image", "atlas": laid.method, "size": size, "coverage": laid.coverage}
-    return textured(texture, laid, Path(out).stem), facts
-
-
-def _write(texture, mesh, out, size, method, time_limit, channel, force, console) -> dict:
-    suffix = Path(out).suffix.lower()
-    if suffix in VOLUMES:
-        from ..io.vdb_texture import write_vdb_texture
-
-        write_vdb_texture(out, texture, force=force)
-        return {"colors": "voxels"}
-    from ..io import write_mesh
-
-    if suffix in PICTURES:
-        from ..io.pictures import write_picture
-        from ..texture.atlas import atlas_colors, atlas_for
-
-        laid = atlas_for(mesh, size, method, time_limit=time_limit)
-        write_picture(out, atlas_colors(texture, laid, channel=channel), force=force)
-        write_mesh(_mesh_beside(out), laid.mesh, force=force)
-        return {"colors": "image", "atlas": laid.method, "size": size, "coverage": laid.coverage}
-    colored, facts = _colored(texture, mesh, out, None, size, method, time_limit, console)
-    write_mesh(out, colored, force=force)
-    return facts
-
-
-def _mesh_beside(picture: str) -> Path:
-    """Where the mesh goes that a picture alone fits."""
-    return Path(picture).with_name(f"{Path(picture).stem}-atlas.obj")
-
-
 def _displaced(texture, mesh, resolution: float, console: Console):
     from ..surface import marching_cubes
     from ..texture.displace import displaced_band
@@ -210,17 +161,3 @@ def _displaced(texture, mesh, resolution: float, console: Console):
     with console.stage("displacement"):
         band = displaced_band(texture, mesh, resolution=resolution, progress=console.progress)
         return marching_cubes(band)
-
-
-def _laid_words(facts: dict) -> str:
-    words = {
-        "none": "no colours",
-        "vertices": "colours at vertices",
-        "voxels": "colours at voxels",
-        "image": "an image",
-    }[facts["colors"]]
-    if facts["colors"] != "image":
-        return words
-    by = {"own": "the mesh's own coordinates", "xatlas": "coordinates by xatlas",
-          "squares": "a square for every two faces"}[facts["atlas"]]  # fmt: skip
-    return f"{words} of {facts['size']} x {facts['size']} pixels, {by}"

@@ -50,12 +50,15 @@ class Atlas:
         The face that a texel shows; -1 for none.
     places : (h, w, 2) float32
         Weights of its second and third corner.
+    without_xatlas : str
+        Why it is squares though xatlas would have been welcome; empty if that is not so.
     """
 
     mesh: Mesh
     method: str
     face_of: Int32[np.ndarray, "h w"]
     places: Float32[np.ndarray, "h w 2"]
+    without_xatlas: str = ""
 
     @property
     def coverage(self) -> float:
@@ -92,17 +95,17 @@ def atlas_for(
     if method == "own" and mesh.uv is None:
         what = "the mesh has no texture coordinates of its own"
         raise TextureError(what, WHERE, 'use method="auto"')
-    used = method
+    used, why = method, ""
     if method == "own" or (method == "auto" and mesh.uv is not None and _is_one_to_one(mesh)):
         laid, used = mesh, "own"
     elif method in ("auto", "xatlas"):
-        laid, used = _unwrapped(mesh, size, method, time_limit)
+        laid, used, why = _unwrapped(mesh, size, method, time_limit)
     else:
         laid = lay_out_faces(mesh, size)
     face_of = np.full((size, size), NO_FACE, np.int32)
     places = np.zeros((size, size, 2), np.float32)
     draw_faces(_in_texels(laid.uv, size), laid.faces, size, size, MARGIN, face_of, places)
-    return Atlas(laid, used, face_of, places)
+    return Atlas(laid, used, face_of, places, why)
 
 
 def atlas_colors(texture: VolumeTexture, atlas: Atlas, *, channel: str = "base") -> Picture:
@@ -217,10 +220,12 @@ def _texel_widths(atlas: Atlas) -> np.ndarray:
     return np.sqrt(np.divide(area, flat, out=np.zeros_like(area), where=flat > 0))
 
 
-def _unwrapped(mesh: Mesh, size: int, method: str, time_limit: float) -> tuple[Mesh, str]:
+def _unwrapped(mesh: Mesh, size: int, method: str, time_limit: float) -> tuple[Mesh, str, str]:
+    """The mesh laid out by xatlas, or else by squares, and why not by xatlas."""
     try:
-        return unwrap(mesh, size, time_limit), "xatlas"
-    except TextureError:
+        return unwrap(mesh, size, time_limit), "xatlas", ""
+    except TextureError as error:
         if method == "xatlas":
             raise
-    return lay_out_faces(mesh, size), "squares"
+        why = f"{error.what}: {error.fix.split(', or ')[0]}"
+    return lay_out_faces(mesh, size), "squares", why

@@ -128,6 +128,14 @@ def test_xatlas_that_takes_too_long_is_stopped():
         atlas_for(icosphere(subdivisions=2), 128, "xatlas", time_limit=1e-3)
 
 
+def test_squares_instead_of_xatlas_say_why():
+    pytest.importorskip("xatlas", reason="the extra unwrap is not installed")
+    laid = atlas_for(icosphere(subdivisions=2), 256, time_limit=1e-3)
+    assert laid.method == "squares"
+    assert laid.without_xatlas == "xatlas was not done in 0.001 seconds: allow more time"
+    assert atlas_for(icosphere(subdivisions=2), 256, "squares").without_xatlas == ""
+
+
 def test_what_is_not_known_is_filled_from_its_surroundings():
     rng = np.random.default_rng(0)
     known = rng.random((37, 61)) < 0.02
