@@ -61,6 +61,7 @@ if TYPE_CHECKING:
         marching_squares,
         marching_squares_rows,
         singular_cells,
+        surface_nets,
     )
     from .texture import (
         Brush,
@@ -132,6 +133,7 @@ _HOME = {
     "sample_distances": "sdf",
     "sample_surface": "mesh",
     "singular_cells": "surface",
+    "surface_nets": "surface",
     "textured": "texture",
     "transfer": "texture",
     "vertex_colored": "texture",
@@ -195,6 +197,7 @@ __all__ = [
     "sample_distances",
     "sample_surface",
     "singular_cells",
+    "surface_nets",
     "textured",
     "transfer",
     "vertex_colored",

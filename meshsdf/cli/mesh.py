@@ -11,11 +11,11 @@ from .options import Names, Number, force_option, json_option, path
 @click.argument("out", type=path)
 @click.option(
     "--method",
-    type=click.Choice(["marching-cubes", "dual-contouring"]),
+    type=click.Choice(["marching-cubes", "dual-contouring", "surface-nets"]),
     default="marching-cubes",
     show_default=True,
     help="How the surface is extracted; dual contouring gives sharp features back where VOLUME was "
-    "made with convert --hermite, or --source names its mesh.",
+    "made with convert --hermite, or --source names its mesh; surface nets are OpenVDB's.",
 )
 @click.option(
     "--level",
@@ -71,6 +71,7 @@ def command(
         dual_contouring,
         marching_cubes,
         require_faces,
+        surface_nets,
     )
 
     is_dual = method == "dual-contouring"
@@ -78,7 +79,7 @@ def command(
         raise click.UsageError("--carry needs --source MESH")
     if source is not None and carry is None and not is_dual:
         raise click.UsageError("--source is for --carry and --method dual-contouring")
-    if is_dual and topology != "manifold":
+    if method != "marching-cubes" and topology != "manifold":
         raise click.UsageError("--topology is for --method marching-cubes")
     check_input(volume, kind="volume")
     if source is not None:
@@ -93,15 +94,15 @@ def command(
     owner = None
     if source is not None:
         owner = read_mesh(source, warn=console.warn)
+    options = {"level": level, "border": border, "progress": console.progress}
     if is_dual:
         for warning in choose_normals(loaded, owner, level=level).warnings:
             console.warn(warning)
-        options = {"level": level, "border": border, "progress": console.progress}
         surface = dual_contouring(loaded, owner, **options)
+    elif method == "surface-nets":
+        surface = surface_nets(loaded, **options)
     else:
-        surface = marching_cubes(
-            loaded, level=level, border=border, topology=topology, progress=console.progress
-        )
+        surface = marching_cubes(loaded, topology=topology, **options)
     require_faces(surface, level=level)
     shape = {"is_watertight": is_watertight(surface), "euler_number": euler_number(surface)}
     if carry is not None:

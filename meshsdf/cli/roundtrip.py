@@ -36,9 +36,9 @@ from .reports import check_reports, limit_words, report_option, write_reports
 @click.option(
     "--method",
     "methods",
-    type=Names("marching-cubes", "dual-contouring"),
+    type=Names("marching-cubes", "dual-contouring", "surface-nets"),
     default=("marching-cubes",),
-    help="How the surface is extracted; with both, they are compared.  [default: marching-cubes]",
+    help="How the surface is extracted; with several, they are compared.  [default: marching-cubes]",
 )
 @half_width_option
 @sign_option

@@ -17,13 +17,13 @@ from ..progress import Progress, silent
 from ..sdf import mesh_to_band
 from ..sdf.memory import require_memory
 from ..sdf.sign import SignMethod
-from ..surface import default_level, dual_contouring, marching_cubes
+from ..surface import default_level, dual_contouring, marching_cubes, surface_nets
 from .color_difference import ColorLoss
 from .compare import Comparison, compare
 from .row_details import RowDetails, coarse_details, row_details
 
-Method = Literal["marching-cubes", "dual-contouring"]
-METHODS = ("marching-cubes", "dual-contouring")
+Method = Literal["marching-cubes", "dual-contouring", "surface-nets"]
+METHODS = ("marching-cubes", "dual-contouring", "surface-nets")
 
 VOXEL_SHARE = 1e-3
 """The interval of the maximum is narrowed until it is no wider than this part of a voxel."""
@@ -157,7 +157,7 @@ def roundtrip(
         Any triangles with area.
     resolutions : sequence of float
         Voxels along the longest side, one row each.
-    methods : sequence of {"marching-cubes", "dual-contouring"}
+    methods : sequence of {"marching-cubes", "dual-contouring", "surface-nets"}
         How the surface is extracted; with both, each has its rows. Dual contouring sees the mesh.
     sign, half_width, report, max_memory, progress
         As for `mesh_to_band`.
@@ -261,6 +261,8 @@ class _Work:
         level, warnings = default_level(band)
         if method == "marching-cubes":
             surface = marching_cubes(band, level=level, progress=self.progress)
+        elif method == "surface-nets":
+            surface = surface_nets(band, level=level, progress=self.progress)
         else:
             surface = dual_contouring(band, self.mesh, level=level, progress=self.progress)
         marks.append(time.perf_counter())

@@ -3,7 +3,11 @@
 from .notation import count, place, written
 from .pair_words import PairWords
 
-METHOD_WORDS = {"marching-cubes": "marching cubes", "dual-contouring": "dual contouring"}
+METHOD_WORDS = {
+    "marching-cubes": "marching cubes",
+    "dual-contouring": "dual contouring",
+    "surface-nets": "surface nets",
+}
 SIDES = {"forward": "of the mesh", "backward": "of what came back"}
 
 

@@ -1,4 +1,4 @@
-"""field -> mesh: marching squares and cubes, dual contouring."""
+"""field -> mesh: marching squares and cubes, dual contouring, surface nets."""
 
 from .carry import carry
 from .continuation import continue_surface
@@ -11,6 +11,7 @@ from .marching_slices import marching_cubes_slices
 from .marching_squares import marching_squares, marching_squares_rows
 from .plane_sweep import MeshPart
 from .seeds import find_seeds
+from .surface_nets import surface_nets
 
 __all__ = [
     "Curve",
@@ -29,4 +30,5 @@ __all__ = [
     "require_faces",
     "sample_hermite",
     "singular_cells",
+    "surface_nets",
 ]

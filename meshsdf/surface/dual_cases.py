@@ -22,6 +22,7 @@ from .cube_cases import CORNERS, EDGES, FACES, face_arcs, loops
 
 MOST_LOOPS = 4
 MOST_PLANES = 3
+ALL_FACES = 0b111111
 
 _NORMALS = tuple(n for n in product((-1, 0, 1), repeat=3) if any(n))
 
@@ -52,21 +53,25 @@ class DualCases:
 
 
 @cache
-def dual_cases() -> DualCases:
-    """Derive the loops of all patterns; done once per process, in some milliseconds."""
+def dual_cases(*, joined: bool = False) -> DualCases:
+    """Derive the loops of all patterns; done once per process, in some milliseconds.
+
+    Of corners that face each other across a side of the cell, those outside are joined, or those
+    inside if ``joined``.
+    """
     n_loops, n_sides = np.zeros((2, 256), np.int8)
     loop_size = np.zeros((256, MOST_LOOPS), np.int8)
     loop_edges = np.full((256, 12), -1, np.int8)
     folded = np.zeros((256, len(FACES)), np.uint8)
     for pattern in range(256):
-        found = loops(pattern)
+        found = loops(pattern, ALL_FACES if joined else 0)
         edges = [edge for loop in found for edge in loop]
         n_loops[pattern], n_sides[pattern] = len(found), len(edges)
         loop_size[pattern, : len(found)] = [len(loop) for loop in found]
         loop_edges[pattern, : len(edges)] = edges
         loop_of = {edge: number for number, loop in enumerate(found) for edge in loop}
         for face in range(len(FACES)):
-            arcs = face_arcs(pattern, face)
+            arcs = face_arcs(pattern, face, joined=joined)
             folded[pattern, face] = len(arcs) == 2 and len({loop_of[edge] for edge in arcs}) == 1
     return DualCases(n_loops, n_sides, loop_size, loop_edges, folded)
 

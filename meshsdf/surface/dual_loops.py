@@ -80,16 +80,23 @@ class DualLoops:
 
 
 def find_loops(
-    field: BrickField, level: float, toward_infinity: float, progress: Progress = silent
+    field: BrickField,
+    level: float,
+    toward_infinity: float,
+    progress: Progress = silent,
+    *,
+    joined: bool = False,
 ) -> DualLoops:
     """Count, add up, fill: every brick then writes at places of its own.
+
+    ``joined`` as for `dual_cases`.
 
     Raises
     ------
     SurfaceError
         There are more than 2^31 - 1 loops or corners of loops.
     """
-    cases = dual_cases()
+    cases = dual_cases(joined=joined)
     n = len(field.corners)
     shared = field.inside, field.valid, field.near
     words, totals = np.empty((n, 24), np.uint64), np.empty((n, 2), np.int64)

@@ -161,7 +161,7 @@ def locate_by_store(band: NarrowBand, loops: DualLoops, progress: Progress) -> L
     crossings = Crossings(loops.nodes, loops.ways, hermite.fractions, hermite.normals)
     points, _ = fitted_points(loops, crossings, **EXACT, progress=progress)
     points[hermite.loops] = to_voxels(band, loops, hermite.loop_points)
-    arcs, places = _with_folded(loops, crossings, hermite.arcs)
+    arcs, places = with_folded(loops, crossings, hermite.arcs)
     places[np.searchsorted(arcs, hermite.arcs)] = to_voxels(band, loops, hermite.arc_points)
     return Located(loops, crossings, points, arcs, places, ALLOWED)
 
@@ -173,7 +173,7 @@ def locate_by_gradients(
     crossings = gradient_crossings(volume, field, loops, progress)
     points, _ = fitted_points(loops, crossings, **ESTIMATED, progress=progress)
     return Located(
-        loops, crossings, points, *_with_folded(loops, crossings, np.empty(0, np.int64)), np.inf
+        loops, crossings, points, *with_folded(loops, crossings, np.empty(0, np.int64)), np.inf
     )
 
 
@@ -207,7 +207,7 @@ def to_voxels(volume: NarrowBand | Grid, loops: DualLoops, points: Points) -> Po
     return (points - origin) / volume.voxel_size - loops.base
 
 
-def _with_folded(
+def with_folded(
     loops: DualLoops, crossings: Crossings, arcs: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Keys of arcs with a vertex: those given, and those that need one; the arcs' middles."""

@@ -2,20 +2,24 @@
 
 import itertools
 import json
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from scipy.spatial import cKDTree
 
 from meshsdf.errors import IoError
 from meshsdf.grid import Grid
+from meshsdf.io import read_mesh
 from meshsdf.io.vdb import probe_vdb, read_vdb, read_vdb_grids, write_vdb, write_vdb_grids
 from meshsdf.mesh import Mesh
 from meshsdf.mesh.measures import volume
 from meshsdf.mesh.primitives import box_mesh, icosphere
 from meshsdf.report import hausdorff
 from meshsdf.sdf import mesh_to_band
-from meshsdf.surface import marching_cubes
+from meshsdf.surface import marching_cubes, surface_nets
 from tests.io.examples import narrow_band
 from tests.io.vdb_examples import (
     empty_band,
@@ -27,6 +31,9 @@ from tests.io.vdb_examples import (
 )
 
 pytestmark = needs_openvdb
+
+MODELS = os.environ.get("MESHSDF_MODELS")
+REAL = ["armadillo.obj", "fandisk.obj", "spot.obj", "3holes.off"] if MODELS else []
 
 AFFINE = np.array([[0.1, 0, 0, 7], [0.05, 0.2, 0, 8], [0, 0, 0.3, 9], [0, 0, 0, 1.0]])
 
@@ -236,16 +243,45 @@ def test_probing_tells_what_openvdb_tells_without_reading_values(theirs):
     assert probe_vdb(theirs / "stream.vdb")["grids"][0]["name"] == "odd"
 
 
-def test_openvdb_extracts_the_surface_that_we_extract(tmp_path):
-    band = mesh_to_band(icosphere(1.0, subdivisions=5), resolution=128)
-    path = tmp_path / "ball.vdb"
-    write_vdb(path, band)
+def quads_of_openvdb(path):
+    """Points (n, 3) and quads (q, 4), counter-clockwise seen from outside."""
     run_openvdb("quads", path)
     with np.load(f"{path}.npz") as data:
-        points, quads = data["points"].astype(np.float64), data["quads"].astype(np.int32)
-    theirs = Mesh(points, np.concatenate([quads[:, [2, 1, 0]], quads[:, [3, 2, 0]]]))
-    voxel = band.voxel_size
-    apart = hausdorff(marching_cubes(band), theirs, tolerance=1e-3 * voxel).distance
-    assert apart.upper < 0.02 * voxel
-    # Seen from outside both go around the same way
+        return data["points"].astype(np.float64), data["quads"].astype(np.int32)[:, ::-1]
+
+
+def cut_as(quads, ours):
+    """Quads in triangles, by the diagonals that faces of ours have (vertices alike)."""
+    edges = ours.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    known = np.unique(edges.min(axis=1) * ours.n_vertices + edges.max(axis=1))
+    ends = quads[:, [0, 2]].astype(np.int64)
+    first = np.isin(ends.min(axis=1) * ours.n_vertices + ends.max(axis=1), known)
+    turned = np.where(first[:, None], quads, np.roll(quads, -1, axis=1))
+    return np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
+
+
+@pytest.mark.parametrize("name", ["ball", *REAL])
+def test_openvdb_extracts_the_surface_that_we_extract(name, tmp_path):
+    mesh = icosphere(1.0, subdivisions=5) if name == "ball" else read_mesh(Path(MODELS) / name)
+    band = mesh_to_band(mesh, resolution=128)
+    write_vdb(tmp_path / "level_set.vdb", band)
+    points, quads = quads_of_openvdb(tmp_path / "level_set.vdb")
+    ours = surface_nets(band)
+    apart, vertex = cKDTree(ours.vertices).query(points)
+    assert len(points) == ours.n_vertices
+    assert apart.max() < 1e-4 * band.voxel_size
+    assert len(np.unique(vertex)) == len(points)
+    theirs = Mesh(ours.vertices, cut_as(vertex[quads].astype(np.int32), ours))
+    rows = [np.unique(np.sort(mesh.faces, axis=1), axis=0) for mesh in (ours, theirs)]
+    assert_array_equal(*rows)  # the same polygons
+    assert volume(theirs) == pytest.approx(volume(ours))  # and the same way round
+
+
+def test_the_surface_of_a_ball_is_that_of_marching_cubes_too(tmp_path):
+    band = mesh_to_band(icosphere(1.0, subdivisions=5), resolution=128)
+    write_vdb(tmp_path / "ball.vdb", band)
+    points, quads = quads_of_openvdb(tmp_path / "ball.vdb")
+    theirs = Mesh(points, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    apart = hausdorff(marching_cubes(band), theirs, tolerance=1e-3 * band.voxel_size).distance
+    assert apart.upper < 0.02 * band.voxel_size
     assert volume(theirs) == pytest.approx(4.18, rel=0.01)
