@@ -111,7 +111,9 @@ def _check_options(kind: str, out: str, given: set[str], options: dict) -> None:
         raise click.UsageError("give --resolution or --voxel-size, not both")
     if options["dense"] and options["closest"]:
         raise click.UsageError("--closest is for narrow bands; leave out --dense")
-    if options["hermite"] and (options["dense"] or not suffix.endswith((".npz", ".zarr"))):
+    if options["hermite"] and (
+        options["dense"] or not suffix.endswith((".npz", ".zarr", ".zarr.zip"))
+    ):
         raise click.UsageError("--hermite is for narrow bands in .npz and .zarr")
     if options["grids"] is not None and (options["dense"] or not suffix.endswith(".vdb")):
         raise click.UsageError("--grids is for narrow bands in .vdb files")

@@ -13,6 +13,10 @@ MOST_PIXELS = 2**28
 ROOM_PER_FILE_BYTE = 64
 
 _SCRIPT = """
+with OpenEXR.File("picture.exr", header_only=True) as file:
+    (left, top), (right, bottom) = file.header()["dataWindow"]
+    if (int(right) - int(left) + 1) * (int(bottom) - int(top) + 1) > int(sys.argv[3]):
+        sys.exit("too large")
 with OpenEXR.File("picture.exr", separate_channels=True) as file:
     channels = file.channels()
     found = [channels[name].pixels for name in "RGBA" if name in channels]
@@ -21,20 +25,20 @@ with OpenEXR.File("picture.exr", separate_channels=True) as file:
     shape = found[0].shape
     if len(shape) != 2 or any(one.shape != shape for one in found):
         sys.exit("channels of several sizes")
-    if shape[0] * shape[1] > int(sys.argv[3]):
-        sys.exit("too large")
     pixels = numpy.stack([one.astype(numpy.float32) for one in found], axis=-1)
     numpy.save("pixels.npy", pixels)
 """
 
 
-def read_exr_picture(path: Path) -> Float32[np.ndarray, "h w c"]:
+def read_exr_picture(path: Path, most_pixels: int = MOST_PIXELS) -> Float32[np.ndarray, "h w c"]:
     """Return the channels R, G, B and A, or Y and A; RGB not multiplied by alpha; NaN as 0.
+
+    No more than its headers is read of a picture of more than ``most_pixels``.
 
     Raises
     ------
     ValueError
-        It is no OpenEXR picture of these channels, or damaged.
+        It is no OpenEXR picture of these channels, damaged, or too large.
     OSError
         It cannot be read.
     """
@@ -44,7 +48,7 @@ def read_exr_picture(path: Path) -> Float32[np.ndarray, "h w c"]:
     with TemporaryDirectory(prefix="meshsdf-") as name:
         folder = Path(name)
         (folder / "picture.exr").write_bytes(data)
-        run_apart(folder, _SCRIPT, [str(MOST_PIXELS)], ROOM_PER_FILE_BYTE * len(data))
+        run_apart(folder, _SCRIPT, [str(most_pixels)], ROOM_PER_FILE_BYTE * len(data))
         pixels = np.load(folder / "pixels.npy")
     pixels = np.nan_to_num(pixels, posinf=65504.0, neginf=-65504.0)
     if pixels.shape[2] in (2, 4):

@@ -9,8 +9,8 @@ import numpy as np
 
 from .warn import Warn
 
-_IMAGE_ERRORS = (OSError, ValueError, SyntaxError, TypeError, IndexError, KeyError, EOFError)
-_MORE_IMAGE_ERRORS = (AttributeError, OverflowError, MemoryError, struct.error, RuntimeError)
+IMAGE_ERRORS = (OSError, ValueError, SyntaxError, TypeError, IndexError, KeyError, EOFError)
+MORE_IMAGE_ERRORS = (AttributeError, OverflowError, MemoryError, struct.error, RuntimeError)
 _KEPT_MODES = {"L", "LA", "RGB", "RGBA"}
 
 
@@ -28,11 +28,11 @@ def read_image(source: Path | object, warn: Warn) -> np.ndarray | None:
             warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(source) if isinstance(source, Path) else source as image:
-                pixels = np.asarray(image.convert(_mode(image)))
+                pixels = _eight_bits(image)
     except bombs as error:
         warn(f"image {shown} is left out, it is too large: {error}")
         return None
-    except (*_IMAGE_ERRORS, *_MORE_IMAGE_ERRORS) as error:
+    except (*IMAGE_ERRORS, *MORE_IMAGE_ERRORS) as error:
         warn(f"image {shown} cannot be read: {error}")
         return None
     return pixels.reshape(*pixels.shape[:2], -1)
@@ -48,9 +48,16 @@ def encode_png(image: np.ndarray) -> bytes:
     return out.getvalue()
 
 
+def _eight_bits(image) -> np.ndarray:
+    """The pixels, 8 bits each; of 16 bits the upper ones, which Pillow would clip instead."""
+    if image.mode == "I" or image.mode.startswith("I;16"):
+        return (np.clip(np.asarray(image), 0, 65535) >> 8).astype(np.uint8)
+    return np.asarray(image.convert(_mode(image)))
+
+
 def _mode(image) -> str:
     if image.mode in _KEPT_MODES:
         return image.mode
     if image.mode == "P":
         return "RGBA" if "transparency" in image.info else "RGB"
-    return "L" if image.mode in ("1", "I", "I;16", "F") else "RGB"
+    return "L" if image.mode in ("1", "F") else "RGB"

@@ -23,8 +23,10 @@ _HEADER = re.compile(
 )
 _KINDS = {"f": (2, 4, 8), "i": (1, 4, 8), "u": (8,), "U": range(1, 65)}
 _MAX_ENTRIES = 64
-_EPOCH = (1980, 1, 1, 0, 0, 0)
 _CHUNK = 1 << 24
+
+EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The date of every entry: the earliest that a zip can tell."""
 
 ZIP_ERRORS = (
     zipfile.BadZipFile,
@@ -134,7 +136,7 @@ def write_archive(path: Path, arrays: dict[str, np.ndarray]) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
         for name, array in arrays.items():
             # Neither the clock nor the operating system may leave a trace.
-            info = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
+            info = zipfile.ZipInfo(f"{name}.npy", EPOCH)
             info.create_system, info.external_attr = 3, 0o644 << 16
             array = np.asarray(array, array.dtype.newbyteorder("<"), order="C")
             info.file_size = array.nbytes + _LONGEST_HEADER

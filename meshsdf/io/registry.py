@@ -111,12 +111,25 @@ FORMATS = (
         marker="zarr.json",
         holds=_SPARSE | {"double", "hermite"},
     ),
+    Format(
+        *("Zarr in a zip", (".zarr.zip",), "volume", "zarr_volume"),
+        *("read_zarr", "write_zarr", "probe_zarr"),
+        has_warnings=True,
+        holds=_SPARSE | {"double", "hermite"},
+    ),
 )
 
 
 def suffixes(kind: Kind | None = None) -> tuple[str, ...]:
     """Return the known suffixes, all or those of one kind."""
     return tuple(s for f in FORMATS if kind in (None, f.kind) for s in f.suffixes)
+
+
+def suffix_of(path: str | os.PathLike) -> str:
+    """Return the suffix that names the format of a file, in lower case: ``.npz``, ``.zarr.zip``."""
+    words = Path(path).suffixes[-2:]
+    double = "".join(words).lower()
+    return double if double in suffixes() else "".join(words[-1:]).lower()
 
 
 def format_of(path: str | os.PathLike, kind: Kind | None = None, task: str = "reader") -> Format:
@@ -136,7 +149,7 @@ def format_of(path: str | os.PathLike, kind: Kind | None = None, task: str = "re
     IoError
         No such format; the message lists those there are and suggests the nearest.
     """
-    suffix = Path(path).suffix.lower()
+    suffix = suffix_of(path)
     able = [f for f in FORMATS if kind in (None, f.kind) and getattr(f, task)]
     for candidate in able:
         if suffix in candidate.suffixes:

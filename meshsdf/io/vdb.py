@@ -25,7 +25,6 @@ import numpy as np
 from ..errors import IoError
 from ..grid import Grid, NarrowBand
 from .atomic import atomic_write, check_output
-from .blosc import require_blosc
 from .half import check_half
 from .opened import opened_reader
 from .vdb_archive import read_grid, read_headers, write_archive
@@ -73,7 +72,6 @@ def write_vdb(
     compression : "none", "active", "zip" or "blosc"
         "none" stores every voxel of a leaf, "active" those in the band, "zip" and "blosc" pack
         these. Exact distances hardly pack, so "active" costs a few percent of size and no time.
-        Blosc needs the package numcodecs.
     name : str
         Of the grid; "surface" if not given, "density" for fog.
     grid_class : "level set" or "fog volume"
@@ -140,7 +138,7 @@ def write_vdb_grids(
 
     Notes
     -----
-    Memory: some 20 MB beyond the grids, however large they are.
+    Memory: at most some 40 MB beyond the grids, however large they are.
 
     Examples
     --------
@@ -161,8 +159,6 @@ def write_vdb_grids(
     """
     where = f"output {path}"
     check_output(path, force)
-    if compression == "blosc":
-        require_blosc(where)
     metadata = {"creator": CREATOR} | (metadata or {})
     try:
         check_metadata(metadata)

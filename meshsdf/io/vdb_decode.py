@@ -1,50 +1,31 @@
 """Find and open the values of nodes in the bytes of a ``.vdb`` file; `vdb_values` has the layout.
 
 Nodes follow each other without a table, and how long one is stands in itself. So a first pass
-walks from node to node, and a second one opens all of them together.
+walks from node to node, and a second one opens them, in pieces on all cores.
 """
 
-import struct
 import zlib
-from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Int64
 
+from ..arrays import Indices
+from ..kernels import vdb_read
+from ..kernels.vdb_read import BAD_CODE, BAD_SIZE, COUNT, DATA, END, FOUND, FULL, PACKED
 from .blosc import blosc_decode
-from .vdb_values import ACTIVE_MASK, BLOSC, FULL, HAS_MASK, N_TOLD, SLACK, ValueLayout
+from .vdb_stream import ByteArray
+from .vdb_values import ACTIVE_MASK, BLOSC, ValueLayout
+
+Records = Int64[np.ndarray, "k 6"]
+"""Where the parts of nodes stand in a window of bytes; the columns are those of the kernel."""
 
 
-@dataclass(frozen=True)
-class NodeRecords:
-    """Where the parts of some nodes stand in a window of bytes, one entry for each node.
-
-    Attributes
-    ----------
-    masks : list of bytes
-        Active masks.
-    codes, told, data, ends : list of int
-        The codes; where what they tell begins; where the data begin and end.
-    n_data : list of int
-        How many values the data are.
-    is_packed : list of bool
-        Whether they are packed.
-    """
-
-    masks: list[bytes]
-    codes: list[int]
-    told: list[int]
-    data: list[int]
-    ends: list[int]
-    n_data: list[int]
-    is_packed: list[bool]
-
-
-def scan_nodes(window: bytes, n: int, n_nodes: int, last: int, layout: ValueLayout) -> NodeRecords:
+def scan_nodes(window: ByteArray, n: int, n_nodes: int, last: int, layout: ValueLayout) -> Records:
     """Find the parts of nodes that follow each other, each an active mask and ``n`` values.
 
     Parameters
     ----------
-    window : bytes
+    window : (w,) uint8
         They begin at its first byte.
     n, n_nodes : int
         Values of a node; how many nodes to find at most.
@@ -58,123 +39,80 @@ def scan_nodes(window: bytes, n: int, n_nodes: int, last: int, layout: ValueLayo
     ValueError
         A node makes no sense, or is cut off.
     """
-    records = NodeRecords([], [], [], [], [], [], [])
-    mask_bytes, width, at = n // 8, layout.stored_width, 0
-    heads = [
-        1 + told * layout.width + mask_bytes * has_mask
-        for told, has_mask in zip(N_TOLD, HAS_MASK, strict=True)
-    ]
     full_from = FULL if layout.flags & ACTIVE_MASK else 0
-    while len(records.ends) < n_nodes and at <= last:
-        mask = window[at : at + mask_bytes]
-        at += mask_bytes
-        if at >= len(window):
-            raise ValueError("it is cut off within its values")
-        code, is_packed = window[at], False
-        if code > FULL:
-            raise ValueError(f"a node has the code {code}; there are 0 to {FULL}")
-        n_data = n if code >= full_from else int.from_bytes(mask, "little").bit_count()
-        data, size = at + heads[code], n_data * width
-        if layout.is_packed and (n_data or not layout.is_half):
-            is_packed, size = _packed_size(window, data, size)
-            data += 8
-        if data + size > len(window):
-            raise ValueError("it is cut off within its values")
-        records.masks.append(mask)
-        records.codes.append(code)
-        records.told.append(at + 1)
-        records.data.append(data)
-        records.n_data.append(n_data)
-        records.is_packed.append(is_packed)
-        at = data + size
-        records.ends.append(at)
-    return records
-
-
-def _packed_size(window: bytes, at: int, size: int) -> tuple[bool, int]:
-    """Whether the data at a place are packed, and their bytes there; ``size`` if they are not."""
-    if at + 8 > len(window):
+    numbers = (layout.width, layout.stored_width, full_from, layout.is_packed, layout.is_half)
+    most = min(n_nodes, len(window) // (n // 8 + 1) + 1)
+    records, fault = np.empty((most, 6), np.int64), np.zeros(3, np.int64)
+    found = vdb_read.find_nodes(window, n, last, np.array(numbers, np.int64), records, fault)
+    why, first, second = fault.tolist()
+    if why == BAD_CODE:
+        raise ValueError(f"a node has the code {first}; there are 0 to {FULL}")
+    if why == BAD_SIZE:
+        raise ValueError(f"a node claims {first} bytes for {second} bytes of values")
+    if why != FOUND:
         raise ValueError("it is cut off within its values")
-    told = struct.unpack_from("<q", window, at)[0]
-    # A packing is only written when it is shorter, so a longer one is no honest claim
-    if told > size + SLACK or (told <= 0 and told != -size):
-        raise ValueError(f"a node claims {told} bytes for {size} bytes of values")
-    return told > 0, abs(told)
+    return records[:found]
 
 
-def decode_nodes(window: bytes, records: NodeRecords, n: int, layout: ValueLayout):
-    """Return the values (m, n) or (m, n, c) of nodes, and where (m, n) they are active."""
-    masks = np.frombuffer(b"".join(records.masks), np.uint8)
-    active = np.unpackbits(masks, bitorder="little").view(bool).reshape(-1, n)
-    codes = np.array(records.codes, np.int8)
-    data = np.frombuffer(_unpacked(window, records, layout), layout.stored)
-    data = data.reshape(-1, *layout.background.shape)
-    if not layout.flags & ACTIVE_MASK:
-        return data.astype(layout.dtype).reshape(*active.shape, *data.shape[1:]), active
-    keep = active | (codes == FULL)[:, None] if (codes == FULL).any() else active
-    values = _inactive_values(window, records, codes, n, layout)
-    values[keep] = data
-    return values, active
+def decode_nodes(
+    window: ByteArray,
+    records: Records,
+    layout: ValueLayout,
+    values: np.ndarray,
+    active: np.ndarray,
+    rows: Indices,
+) -> None:
+    """Fill the rows that belong to the nodes found; other threads may fill other rows.
+
+    Parameters
+    ----------
+    window, records : array
+        As `scan_nodes` had the one and gave the other.
+    layout : ValueLayout
+        How values are stored.
+    values : (m, ...) array
+        Of the layout's dtype; ``n`` values in a row.
+    active : (m, n / 64) uint64
+        Bit ``b`` of word ``w`` tells whether value ``64 w + b`` is active.
+    rows : (k,) int32
+        Row of each node.
+
+    Raises
+    ------
+    ValueError
+        Data are damaged.
+    """
+    n_numbers = active.shape[1] * 64 * layout.background.size
+    words = values.reshape(len(values), n_numbers).view(np.uint32)
+    full_from = FULL if layout.flags & ACTIVE_MASK else 0
+    data = _data(window, records, layout)
+    vdb_read.place_values(window, records, full_from, data, layout.sides, words, active, rows)
 
 
-def _inactive_values(window, records, codes, n, layout) -> np.ndarray:
-    """Values (m, n) or (m, n, c): the one or two that the code of a node tells."""
-    first = np.where((codes == 0)[:, None], layout.background.ravel(), layout.opposite.ravel())
-    second = np.broadcast_to(layout.background.ravel(), first.shape).copy()
-    n_told = np.array(N_TOLD)[codes]
-    for place, told in enumerate((first, second)):
-        rows = np.flatnonzero(n_told > place)
-        starts = [records.told[r] + place * layout.width for r in rows.tolist()]
-        pieces = [window[at : at + layout.width] for at in starts]
-        full = layout.dtype.newbyteorder("<")
-        told[rows] = np.frombuffer(b"".join(pieces), full).reshape(told[rows].shape)
-    shape = (len(codes), 1, *layout.background.shape)
-    first, second = first.reshape(shape), second.reshape(shape)
-    rows = np.flatnonzero(np.array(HAS_MASK)[codes])
-    starts = [records.told[r] + int(n_told[r]) * layout.width for r in rows.tolist()]
-    masks = np.frombuffer(b"".join([window[at : at + n // 8] for at in starts]), np.uint8)
-    chosen = np.unpackbits(masks, bitorder="little").view(bool).reshape(len(rows), n)
-    chosen = chosen.reshape(*chosen.shape, *(1 for _ in layout.background.shape))
-    if len(rows) == len(codes):
-        return np.where(chosen, second, first)
-    values = np.empty((len(codes), n, *layout.background.shape), layout.dtype)
-    values[:] = first
-    values[rows] = np.where(chosen, second[rows], first[rows])
-    return values
+def _data(window: ByteArray, records: Records, layout: ValueLayout) -> np.ndarray:
+    """The stored values of all nodes as words of 32 bits, and room for one value more."""
+    places = np.zeros(len(records) + 1, np.int64)
+    np.cumsum(records[:, COUNT] * layout.stored_width, out=places[1:])
+    data = np.empty(places[-1] + layout.stored_width, np.uint8)
+    data[places[-1] :] = 0
+    vdb_read.copy_plain(window, records, data, places)
+    packed = np.flatnonzero(records[:, PACKED]) if layout.is_packed else ()
+    if len(packed):
+        spans = records[packed][:, [DATA, END]]
+        decode = blosc_decode if layout.flags & BLOSC else _unzip
+        decode(window, spans, data, np.stack([places[packed], places[packed + 1]], axis=1))
+    # A size that is no whole number of values was refused, as it differs from their number's
+    return data.view(layout.stored).astype(layout.dtype, copy=False).view(np.uint32)
 
 
-def _unpacked(window: bytes, records: NodeRecords, layout: ValueLayout) -> bytes:
-    """The data of all nodes, each of just the size that they must have."""
-    spans = list(zip(records.data, records.ends, strict=True))
-    if not any(records.is_packed):
-        return b"".join([window[a:b] for a, b in spans])
-    sizes = [n * layout.stored_width for n in records.n_data]
-    parts = zip(spans, sizes, records.is_packed, strict=True)
-    if layout.flags & BLOSC:
-        packed = [(span, size) for span, size, is_packed in parts if is_packed]
-        opened = blosc_decode(window, [span for span, _ in packed], [size for _, size in packed])
-        if len(packed) == len(sizes):
-            return opened
-        at, pieces = 0, []
-        for (a, b), size, is_packed in zip(spans, sizes, records.is_packed, strict=True):
-            pieces.append(opened[at : at + size] if is_packed else window[a:b])
-            at += size if is_packed else 0
-        return b"".join(pieces)
-    return b"".join(
-        [
-            _unzipped(window[a:b], size) if is_packed else window[a:b]
-            for (a, b), size, is_packed in parts
-        ]
-    )
-
-
-def _unzipped(piece: bytes, size: int) -> bytes:
-    """A zlib stream opened; ValueError unless it gives just that many bytes."""
-    unzip = zlib.decompressobj()
-    try:
-        data = unzip.decompress(piece, size + 1)
-    except zlib.error as error:
-        raise ValueError(f"zipped values are damaged ({error})") from None
-    if len(data) != size or not unzip.eof:
-        raise ValueError(f"zipped values do not give the {size} bytes they must")
-    return data
+def _unzip(window: ByteArray, spans: np.ndarray, target: ByteArray, places: np.ndarray) -> None:
+    """Open zlib streams; ValueError unless each gives just as many bytes as it must."""
+    for (begin, end), (first, last) in zip(spans.tolist(), places.tolist(), strict=True):
+        unzip = zlib.decompressobj()
+        try:
+            piece = unzip.decompress(window[begin:end], last - first + 1)
+        except zlib.error as error:
+            raise ValueError(f"zipped values are damaged ({error})") from None
+        if len(piece) != last - first or not unzip.eof:
+            raise ValueError(f"zipped values do not give the {last - first} bytes they must")
+        target[first:last] = np.frombuffer(piece, np.uint8)

@@ -1,116 +1,97 @@
 """Turn the values of nodes into the bytes of a ``.vdb`` file; `vdb_values` has the layout."""
 
-import struct
 import zlib
-from collections.abc import Callable
 
 import numpy as np
+from jaxtyping import Int64, UInt8, UInt64
 
-from ..kernels.parallel import even_ranges, run_pieces
-from .blosc import blosc_encoder, without_blosc_threads
+from ..arrays import Indices, writable_alias
+from ..kernels.blosc_pack import LARGEST_BLOCK, TABLE, pack_frames
+from ..kernels.vdb_write import choose_values, join_nodes
 from .half import halved
-from .vdb_values import ACTIVE_MASK, BLOSC, FULL, ValueLayout, full_width, same_bits
+from .vdb_stream import ByteArray
+from .vdb_values import ACTIVE_MASK, BLOSC, ValueLayout
 
-NODES_PER_TASK = 256
+Masks = UInt64[np.ndarray, "k w"]
 
 
 def encode_nodes(
-    values: np.ndarray, active: np.ndarray, child: np.ndarray | None, layout: ValueLayout
-) -> tuple[list[bytes], list[bytes | memoryview]]:
-    """Return, for each of ``m`` nodes, its code with what follows it, and its data.
+    values: np.ndarray,
+    rows: Indices,
+    active: Masks,
+    child: Masks | None,
+    heads: UInt8[np.ndarray, "k h"],
+    layout: ValueLayout,
+) -> tuple[ByteArray, Int64[np.ndarray, " k"]]:
+    """Return the bytes of ``k`` nodes, one after another, and where each ends.
 
     Parameters
     ----------
-    values : (m, n) or (m, n, c)
-        Of the layout's dtype.
-    active : (m, n) bool
-        Which values are active.
-    child : (m, n) bool or None
+    values : (m, ...) array
+        Of the layout's dtype; ``n`` values in a row.
+    rows : (k,) int32
+        The row of each node.
+    active : (k, n / 64) uint64
+        Bit ``b`` of word ``w`` tells whether value ``64 w + b`` is active.
+    child : (k, n / 64) uint64 or None
         Where a node below stands instead of a value; never active.
+    heads : (k, h) uint8
+        What stands before the code: its masks.
     layout : ValueLayout
-        How they are stored.
+        How values are stored.
     """
-    heads = [bytes([FULL])] * len(values)
-    keep = np.ones_like(active)
-    if layout.flags & ACTIVE_MASK:
-        inactive = ~active if child is None else ~(active | child)
-        heads, keep = _inactive_heads(values, inactive, layout)
-        keep |= active
-    stored = values[keep]
-    stored = halved(stored) if layout.is_half else stored.astype(layout.stored, copy=False)
-    data = memoryview(stored.reshape(-1).view(np.uint8))
-    ends = (np.cumsum(np.count_nonzero(keep, axis=1)) * layout.stored_width).tolist()
-    pieces = [data[a:b] for a, b in zip([0, *ends[:-1]], ends, strict=True)]
-    if layout.is_packed:
-        pieces = _all_packed(pieces, layout)
-    return heads, pieces
+    k, n_words = active.shape
+    codes, told, choices, data, ends = _chosen(values, rows, active, child, layout)
+    data = halved(data) if layout.is_half else data.astype(layout.stored, copy=False)
+    packed, counts, sizes = _packed(data.view(np.uint8), ends * layout.stored_width, layout)
+    shown = _full_width(told, layout).view(np.uint8).reshape(k, 2 * layout.width)
+    chosen = choices.astype("<u8", copy=False).view(np.uint8)
+    longest = heads.shape[1] + 1 + 2 * layout.width + 8 * n_words + 8
+    out = np.empty(k * longest + len(packed), np.uint8)
+    numbers = np.array((layout.width, layout.is_packed, layout.is_half), np.int64)
+    ends = np.empty(k, np.int64)
+    join_nodes(heads, codes, shown, chosen, packed, counts, sizes, numbers, out, ends)
+    return out[: ends[-1] if k else 0], ends
 
 
-def _all_packed(pieces: list[memoryview], layout: ValueLayout) -> list[bytes]:
-    """The data of many nodes behind their sizes; zlib lets other threads run."""
-    if layout.flags & BLOSC:  # so quick that threads would wait for each other
-        with without_blosc_threads():
-            encode = blosc_encoder(layout.stored_width)
-            return [_packed(piece, layout, encode) for piece in pieces]
-    packed = [b""] * len(pieces)
-    ranges = even_ranges(len(pieces), len(pieces) // NODES_PER_TASK + 1)
-
-    def work(task: int) -> None:
-        for n in range(*ranges[task]):
-            packed[n] = _packed(pieces[n], layout, zlib.compress)
-
-    run_pieces(work, len(ranges))
-    return packed
-
-
-def _packed(piece: memoryview, layout: ValueLayout, encode: Callable[[memoryview], bytes]) -> bytes:
-    """A node's data behind their size."""
-    if not piece:
-        return b"" if layout.is_half else bytes(8)
-    packed = encode(piece)
-    if len(packed) < len(piece):
-        return struct.pack("<q", len(packed)) + packed
-    return struct.pack("<q", -len(piece)) + piece
+def _chosen(values, rows, active, child, layout) -> tuple[np.ndarray, ...]:
+    """Codes, what they tell, where the second of two stands; stored values, where each's end."""
+    (k, n_words), c = active.shape, layout.width // 4
+    words = np.ascontiguousarray(values).reshape(len(values), 64 * n_words * layout.background.size)
+    words = writable_alias(words.view(np.uint32))
+    sides = layout.sides
+    codes, choices = np.empty(k, np.int64), np.zeros((k, n_words), np.uint64)
+    told, ends = np.zeros((k, 2, c), np.uint32), np.empty(k, np.int64)
+    data = np.empty(c * (64 * n_words * k + 1), np.uint32)
+    child = np.zeros_like(active) if child is None else child
+    is_sparse = bool(layout.flags & ACTIVE_MASK)
+    choose_values(words, rows, active, child, sides, is_sparse, codes, told, choices, data, ends)
+    stored = data[: ends[-1] if k else 0].view(layout.dtype)
+    return codes, told.view(layout.dtype), choices, stored, ends // c
 
 
-def _inactive_heads(
-    values: np.ndarray, inactive: np.ndarray, layout: ValueLayout
-) -> tuple[list[bytes], np.ndarray]:
-    """Code and what follows it for every node, and which inactive values must be stored."""
-    is_plus = inactive & same_bits(values, layout.background)
-    is_minus = inactive & ~is_plus & same_bits(values, layout.opposite)
-    any_minus = is_minus.any(axis=1)
-    codes = np.where(any_minus, np.where(is_plus.any(axis=1), 3, 1), 0)
-    heads = [bytes([code]) for code in codes.tolist()]
-    rows = np.flatnonzero(codes == 3)
-    masks = np.packbits(is_plus[rows], axis=1, bitorder="little").tobytes()
-    size = values.shape[1] // 8
-    for number, row in enumerate(rows.tolist()):
-        heads[row] += masks[number * size : (number + 1) * size]
-    keep = np.zeros_like(inactive)
-    odd = (inactive & ~is_plus & ~is_minus).any(axis=1)
-    for row in np.flatnonzero(odd).tolist():
-        heads[row] = _odd_head(values[row], inactive[row], layout)
-        keep[row] = heads[row][0] == FULL
-    return heads, keep
+def _full_width(values: np.ndarray, layout: ValueLayout) -> np.ndarray:
+    """Values at full width, but rounded as the data are."""
+    rounded = halved(values) if layout.is_half else values
+    return rounded.astype(layout.dtype.newbyteorder("<"), copy=False)
 
 
-def _odd_head(values, inactive, layout) -> bytes:
-    """The head of a node with an inactive value that is neither bg nor -bg."""
-    first = int(np.argmax(inactive))
-    rest = inactive & ~same_bits(values, values[first])
-    if not rest.any():
-        return bytes([2]) + full_width(values[first], layout)
-    second = int(np.argmax(rest))
-    is_second = inactive & same_bits(values, values[second])
-    if (rest & ~is_second).any():
-        return bytes([FULL])
-    if same_bits(layout.background, values[second]):
-        code, told = 4, full_width(values[first], layout)
-    elif same_bits(layout.background, values[first]):
-        code, told = 4, full_width(values[second], layout)
-        is_second = inactive & ~is_second
-    else:
-        code = 5
-        told = full_width(values[first], layout) + full_width(values[second], layout)
-    return bytes([code]) + told + np.packbits(is_second, bitorder="little").tobytes()
+def _packed(data: ByteArray, ends: np.ndarray, layout: ValueLayout) -> tuple[np.ndarray, ...]:
+    """The data of nodes, packed where that is shorter, how long each is, and what tells that."""
+    if layout.flags & BLOSC:
+        width, packed = layout.stored_width, np.empty(len(data), np.uint8)
+        scratch, table = np.empty(LARGEST_BLOCK, np.uint8), np.empty(TABLE, np.int32)
+        sizes = np.empty(len(ends), np.int64)
+        last = pack_frames(data, ends, width, scratch, table, packed, sizes)
+        return packed[:last], np.abs(sizes), sizes
+    sizes = -np.diff(ends, prepend=0)
+    if not layout.is_packed:
+        return data, -sizes, sizes
+    view, pieces, begin = memoryview(data), [], 0
+    for number, end in enumerate(ends.tolist()):
+        piece = zlib.compress(view[begin:end])
+        if len(piece) < end - begin:
+            sizes[number] = len(piece)
+        pieces.append(piece if sizes[number] > 0 else view[begin:end])
+        begin = end
+    return np.frombuffer(bytearray().join(pieces), np.uint8), np.abs(sizes), sizes

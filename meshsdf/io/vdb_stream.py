@@ -9,7 +9,13 @@ import uuid
 import zlib
 from typing import BinaryIO
 
+import numpy as np
+from jaxtyping import UInt8
+
 from ..arrays import Number
+
+ByteArray = UInt8[np.ndarray, "_"]
+"""Bytes as kernels take them."""
 
 LONGEST_TEXT = 1 << 16
 """Bytes; names and types are short, and a longer one means that the file is damaged."""
@@ -68,6 +74,15 @@ class VdbReader:
         """Return the next ``n`` bytes, or as many as there are; the cursor stays."""
         self._file.seek(self.at)
         return self._file.read(min(n, self.left))
+
+    def fill(self, buffer: ByteArray) -> ByteArray:
+        """Fill a buffer as `window` would; return the part that is filled."""
+        view = memoryview(buffer)[: min(len(buffer), self.left)]
+        self._file.seek(self.at)
+        done = 0
+        while done < len(view) and (n := self._file.readinto(view[done:])):
+            done += n
+        return buffer[:done]
 
     def take(self, n: int) -> bytes:
         """Return the next ``n`` bytes and pass them."""

@@ -14,6 +14,7 @@ from jaxtyping import Bool
 from ..arrays import Ijk, Indices
 from ..grid import BrickIndex
 from ..grid.brick_index import BRICK, INSIDE, OUTSIDE, PAGE, number_marked
+from ..kernels.vdb_read import END
 from .vdb_decode import decode_nodes, scan_nodes
 from .vdb_leaves import MASK_BYTES
 from .vdb_pages import PAGE_NODES, UPPER, UPPER_NODES
@@ -170,12 +171,15 @@ class _Tree:
         """Codes of a node's entries, and where it has children; the cursor is behind its values."""
         reader, layout = self.reader, self.layout
         child = np.unpackbits(np.frombuffer(reader.take(n // 8), np.uint8), bitorder="little")
-        window = reader.window(layout.longest_node(n))
+        window = reader.fill(np.empty(min(layout.longest_node(n), reader.left), np.uint8))
         records = scan_nodes(window, n, 1, 0, layout)
-        (values,), (active,) = decode_nodes(window, records, n, layout)
-        reader.seek(reader.at + records.ends[0])
+        values = np.empty((1, n, *layout.background.shape), layout.dtype)
+        words = np.empty((1, n // 64), np.uint64)
+        decode_nodes(window, records, layout, values, words, np.zeros(1, np.int32))
+        active = np.unpackbits(words.astype("<u8").view(np.uint8), bitorder="little").view(bool)
+        reader.seek(reader.at + int(records[0, END]))
         child = child.view(bool)
-        return self._codes(values, active, child), child
+        return self._codes(values[0], active, child), child
 
     def _codes(self, values: np.ndarray, active: np.ndarray, child: np.ndarray | None = None):
         """Codes of tiles by their values; those of their own get the next numbers."""

@@ -21,7 +21,7 @@ from .vdb_encode import encode_nodes
 from .vdb_grid import VdbGrid
 from .vdb_leaves import leaf_masks
 from .vdb_pages import UPPER, UPPER_NODES, find_pages
-from .vdb_stream import VdbWriter
+from .vdb_stream import ByteArray, VdbWriter
 from .vdb_values import ValueLayout, full_width
 
 _NODES_AT_ONCE = 128
@@ -47,7 +47,7 @@ def write_topology(writer: VdbWriter, grid: VdbGrid, layout: ValueLayout) -> Ind
         writer.write(origin + value + bytes([int(grid.code_active[-1 - code])]))
     order = [np.empty(0, np.int32)]
     for origin, codes in nodes:
-        writer.write(origin + b"".join(_encoded(codes[None], grid, layout)))
+        writer.write(origin + _encoded(codes[None], grid, layout)[0].tobytes())
         numbers = codes[codes >= 0]
         for first in range(0, len(numbers), _NODES_AT_ONCE):
             chosen = numbers[first : first + _NODES_AT_ONCE]
@@ -72,22 +72,21 @@ def _upper_places(index: BrickIndex) -> Ijk:
 
 def _lower_nodes(entries: np.ndarray, grid: VdbGrid, layout: ValueLayout) -> bytes:
     """Lower nodes (k, 4096), each followed by the masks of its leaves."""
-    nodes = _encoded(entries, grid, layout)
+    nodes, ends = _encoded(entries, grid, layout)
     masks = leaf_masks(grid.active[entries[entries >= 0]])
-    ends = np.cumsum(np.count_nonzero(entries >= 0, axis=1)).tolist()
-    parts = []
-    for node, start, end in zip(nodes, [0, *ends[:-1]], ends, strict=True):
-        parts += [node, *masks[start:end]]
-    return b"".join(parts)
+    last = np.cumsum(np.count_nonzero(entries >= 0, axis=1))
+    parts = zip(np.split(nodes, ends[:-1]), np.split(masks, last[:-1]), strict=True)
+    return b"".join([part.tobytes() for pair in parts for part in pair])
 
 
-def _encoded(codes: np.ndarray, grid: VdbGrid, layout: ValueLayout) -> list[bytes]:
+def _encoded(codes: np.ndarray, grid: VdbGrid, layout: ValueLayout) -> tuple[ByteArray, np.ndarray]:
     """Masks and values of ``k`` nodes whose (k, n) entries are numbers of children or codes."""
     child = codes >= 0
     tile = np.where(child, 0, -1 - codes)
-    active = grid.code_active[tile] & ~child
     values = grid.code_values[tile]
     values[child] = 0
-    heads, data = encode_nodes(values, active, child, layout)
-    masks = [np.packbits(mask, axis=1, bitorder="little") for mask in (child, active)]
-    return [b"".join(node) for node in zip(*masks, heads, data, strict=True)]
+    masks = [child, grid.code_active[tile] & ~child]
+    heads = [np.packbits(mask, axis=1, bitorder="little") for mask in masks]
+    children, active = (head.view("<u8").astype(np.uint64, copy=False) for head in heads)
+    rows = np.arange(len(codes), dtype=np.int32)
+    return encode_nodes(values, rows, active, children, np.concatenate(heads, axis=1), layout)

@@ -20,17 +20,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import UInt32
 
+from ..kernels.vdb_read import SLACK
 from .half import halved
 
 ZIP, ACTIVE_MASK, BLOSC = 1, 2, 4
-
-FULL = 6
-"""The code of a node that stores all its values."""
-
-N_TOLD = (0, 0, 1, 0, 1, 2, 0)  # how many values follow each code
-HAS_MASK = (False, False, False, True, True, True, False)
-SLACK = 64  # bytes by which a packing may exceed what it packs; Blosc's header takes 16
 
 
 def compression_words(flags: int) -> str:
@@ -86,7 +81,12 @@ class ValueLayout:
         """Bytes that a node of ``n`` values takes at most, with its active mask."""
         return n // 8 + 1 + 2 * self.width + n // 8 + 8 + n * self.stored_width + SLACK
 
-    @property
+    @cached_property
+    def sides(self) -> UInt32[np.ndarray, "2 c"]:
+        """The background and its opposite as words of 32 bits, as kernels take them."""
+        return np.stack([self.background.ravel(), self.opposite.ravel()]).view(np.uint32)
+
+    @cached_property
     def opposite(self) -> np.ndarray:
         """The background with its sign changed, component by component."""
         with np.errstate(over="ignore"):

@@ -1,4 +1,4 @@
-"""Arrays of Zarr version 3 in a folder, one file per chunk.
+"""Arrays of Zarr version 3 in a folder, or in a zip of one, with one file per chunk.
 
 An array is a folder with ``zarr.json`` and files ``c/0/0/0``, ...; a chunk without a file holds the
 fill value everywhere. Written are regular chunks, little-endian in C order, packed with gzip. Such
@@ -21,6 +21,7 @@ from ..kernels.parallel import even_ranges, run_pieces
 from .unpacking import check_claim
 from .vdb_stream import UnsuitedError, printable
 from .zarr_package import read_with_package
+from .zarr_zip import Folder, ZipPlace
 
 PLAIN, PACKED = ("bytes",), ("bytes", "gzip")
 """The codecs of chunks that are read here."""
@@ -154,7 +155,7 @@ def write_rows(folder: Path, array: np.ndarray) -> None:
         store(folder, spec, (number, *[0] * (array.ndim - 1)), pack(whole))
 
 
-def read_metadata(folder: Path) -> dict:
+def read_metadata(folder: Folder) -> dict:
     """Return what ``zarr.json`` says; ValueError if it makes no sense."""
     path = folder / "zarr.json"
     if not path.is_file() and (folder / ".zattrs").exists():
@@ -172,7 +173,7 @@ def read_metadata(folder: Path) -> dict:
     return found
 
 
-def read_spec(folder: Path) -> ArraySpec:
+def read_spec(folder: Folder) -> ArraySpec:
     """Return what is said of an array.
 
     Raises
@@ -203,7 +204,7 @@ def read_spec(folder: Path) -> ArraySpec:
     return ArraySpec(shape, chunk, dtype, fill, _codecs(found.get("codecs")), separator)
 
 
-def read_chunk(folder: Path, spec: ArraySpec, at: tuple[int, ...]) -> np.ndarray | None:
+def read_chunk(folder: Folder, spec: ArraySpec, at: tuple[int, ...]) -> np.ndarray | None:
     """Return a chunk of a `PLAIN` or `PACKED` array; None if it is missing: all is fill value."""
     path = folder / spec.chunk_name(at)
     data = _file_bytes(path, spec.chunk_bytes + (spec.chunk_bytes >> 10) + _SLACK)
@@ -226,12 +227,14 @@ def read_chunk(folder: Path, spec: ArraySpec, at: tuple[int, ...]) -> np.ndarray
     return np.frombuffer(data, spec.dtype.newbyteorder("<")).reshape(spec.chunk)
 
 
-def read_whole(folder: Path, spec: ArraySpec, n_there: int, *, is_full: bool = False) -> np.ndarray:
+def read_whole(
+    folder: Folder, spec: ArraySpec, n_there: int, *, is_full: bool = False
+) -> np.ndarray:
     """Return the whole array.
 
     Parameters
     ----------
-    folder, spec : Path, ArraySpec
+    folder, spec : Folder, ArraySpec
         The array.
     n_there : int
         Bytes of the whole volume, for which so much is allowed; see `check_claim`.
@@ -275,8 +278,10 @@ def for_all_chunks(spec: ArraySpec, work: Callable[[tuple[int, ...]], None]) -> 
     run_pieces(run, len(ranges))
 
 
-def _file_bytes(path: Path, most: int) -> bytes | None:
+def _file_bytes(path: Folder, most: int) -> bytes | None:
     """The bytes of a plain file of a likely size; None if there is none."""
+    if isinstance(path, ZipPlace):
+        return path.folder.read(path.name, most)
     try:
         status = os.stat(path)
     except FileNotFoundError:
@@ -286,7 +291,7 @@ def _file_bytes(path: Path, most: int) -> bytes | None:
     return path.read_bytes()
 
 
-def _sides(found: object, least: int, folder: Path) -> tuple[int, ...]:
+def _sides(found: object, least: int, folder: Folder) -> tuple[int, ...]:
     is_list = isinstance(found, list) and 0 < len(found) <= _MOST_DIMENSIONS
     if not is_list or not all(type(n) is int and least <= n < 1 << 40 for n in found):
         raise ValueError(f"{_shown(folder)} claims the shape {printable(str(found))}")
@@ -315,7 +320,7 @@ def _codecs(found: object) -> tuple[str, ...]:
     return tuple(map(printable, names))
 
 
-def _fill(found: object, dtype: np.dtype, folder: Path) -> float | int:
+def _fill(found: object, dtype: np.dtype, folder: Folder) -> float | int:
     if dtype.kind == "f":
         found = _SPECIAL.get(found, found) if isinstance(found, str) else found
         is_number = isinstance(found, int | float)
@@ -326,5 +331,5 @@ def _fill(found: object, dtype: np.dtype, folder: Path) -> float | int:
     raise ValueError(f"{_shown(folder)} has the fill value {printable(str(found))}")
 
 
-def _shown(path: Path) -> str:
+def _shown(path: Folder) -> str:
     return printable("/".join(path.parts[-4:]))

@@ -25,6 +25,7 @@ from .zarr_array import (
     store,
     write_metadata,
 )
+from .zarr_zip import Folder
 
 CHUNK = 64
 """Nodes along a side of a chunk: 1 MiB of float32."""
@@ -110,7 +111,7 @@ def _packed(packer: RunPacker, chunk: np.ndarray) -> bytes:
     return packed if len(packed) <= chunk.nbytes else pack(chunk)
 
 
-def read_band_values(folder: Path, spec: ArraySpec, coordinates: BrickCoordinates) -> BrickValues:
+def read_band_values(folder: Folder, spec: ArraySpec, coordinates: BrickCoordinates) -> BrickValues:
     """Return the values of the bricks with these coordinates, which rise by x, then y, then z.
 
     Raises

@@ -1,7 +1,8 @@
 """Zarr version 3 with the attributes of OME-Zarr 0.5: a folder that viewers open and clouds keep.
 
-``NAME.zarr`` is a group. Its array ``0`` [k, j, i] has the values, as any viewer shows them: of a
-band only the chunks near the surface and inside it are there, the fill value is the background.
+``NAME.zarr`` is a group, and ``NAME.zarr.zip`` the same in one file (`zarr_zip`). Its array ``0``
+[k, j, i] has the values, as any viewer shows them: of a band only the chunks near the surface and
+inside it are there, the fill value is the background.
 The attribute ``ome`` tells where it lies, the attribute ``meshsdf`` all else under the keys of
 `npz`, with ``first_node``, the index of the first node of ``0``. What of a band is no volume of
 nodes, such as its page table, lies in the group ``band``, again under the keys of `npz`; so a band
@@ -15,7 +16,7 @@ import numpy as np
 
 from ..errors import IoError
 from ..grid import BrickIndex, Grid, NarrowBand
-from .atomic import atomic_folder, check_output
+from .atomic import check_output
 from .half import check_half, halved
 from .npy_archive import ArrayHeader
 from .npz import (
@@ -38,6 +39,7 @@ from .warn import Warn, ignore
 from .zarr_array import ArraySpec, read_metadata, read_spec, read_whole, write_group, write_rows
 from .zarr_ome import ome_attributes, placed_array
 from .zarr_values import brick_box, read_band_values, write_band_values, write_grid_values
+from .zarr_zip import Folder, folder_at, new_folder
 
 VALUES, REST = "0", "band"
 """The array of values, and the group with what else a band has."""
@@ -58,13 +60,13 @@ def write_zarr(
     Parameters
     ----------
     path : path
-        The ``.zarr`` folder.
+        The ``.zarr`` folder, or a ``.zarr.zip`` file with what would be in it.
     volume : NarrowBand or Grid
         What is written.
     half : bool
         Round values to float16; see `write_npz`.
     force : bool
-        Replace an existing folder, if it is a Zarr one.
+        Replace an existing file, or a folder if it is a Zarr one.
     warn : callable
         Never called: nothing is lost. Other formats have something to say.
 
@@ -76,7 +78,8 @@ def write_zarr(
 
     Notes
     -----
-    Memory: some chunks of 64^3 nodes beyond the volume, however large it is.
+    Memory: some chunks of 64^3 nodes beyond the volume, however large it is. A zip is made of a
+    folder beside it, so the disk holds both for a moment.
     """
     check_output(path, force)
     where = f"output {path}"
@@ -86,7 +89,7 @@ def write_zarr(
         if half:
             check_half(volume.values, where)
             check_half(np.array([volume.background if is_band else 0.0]), where)
-        with atomic_folder(path, force) as folder:
+        with new_folder(Path(path), force) as folder:
             _write_group(folder, volume, half)
     except ValueError as error:
         raise IoError(f"the volume cannot be written: {error}", where, "build it anew") from error
@@ -98,21 +101,21 @@ def read_zarr(path: str | os.PathLike, *, warn: Warn = ignore) -> NarrowBand | G
     Parameters
     ----------
     path : path
-        The folder.
+        The folder, or a zip of it.
     warn : callable
         Told of attributes that a volume has no place for.
 
     Raises
     ------
     IoError
-        There is no such folder, it is damaged, or does not suit a volume: version 2 of Zarr, axes
-        other than z, y, x, voxels that are no cubes; or it is packed with a codec other than gzip,
-        and the package zarr is not installed. No more memory is taken than some 1000 times the
-        bytes of the folder, or 64 MiB.
+        There is no such folder or file, it is damaged, or does not suit a volume: version 2 of
+        Zarr, axes other than z, y, x, voxels that are no cubes; or it is packed with a codec other
+        than gzip, and the package zarr is not installed. No more memory is taken than some 1000
+        times the bytes that are there, or 64 MiB.
     """
-    with refusing(checked_input(path)) as folder:
+    with refusing(checked_input(path)) as path, folder_at(path) as folder:
         attributes = _attributes(folder)
-        n_there = stored_bytes(folder)
+        n_there = stored_bytes(path)
         if "meshsdf" not in attributes:
             volume = _foreign(folder, attributes, n_there)
         else:
@@ -136,7 +139,7 @@ def probe_zarr(path: str | os.PathLike) -> dict:
     Of an array that others wrote: ``kind``, ``format``, ``voxel_size``, ``origin``, ``shape`` and
     ``dtype``. Values are not read.
     """
-    with refusing(checked_input(path)) as folder:
+    with refusing(checked_input(path)) as path, folder_at(path) as folder:
         attributes = _attributes(folder)
         if "meshsdf" not in attributes:
             name, voxel_size, origin = placed_array(attributes.get("ome"))
@@ -179,7 +182,7 @@ def _is_small(name: str) -> bool:
     return (BAND_KEYS | GRID_KEYS)[name][1] in ((), (3,))
 
 
-def _attributes(folder: Path) -> dict:
+def _attributes(folder: Folder) -> dict:
     found = read_metadata(folder)
     if found.get("node_type") != "group":
         fix = "name the group around it, whose attributes say where it lies"
@@ -190,7 +193,7 @@ def _attributes(folder: Path) -> dict:
     return attributes
 
 
-def _described(folder: Path, told: object) -> tuple[dict[str, np.ndarray], dict[str, ArraySpec]]:
+def _described(folder: Folder, told: object) -> tuple[dict[str, np.ndarray], dict[str, ArraySpec]]:
     """What the attributes say, and what is said of the arrays; both as they must be."""
     if not isinstance(told, dict) or told.get("format") not in (BAND, GRID):
         raise ValueError(f"its attributes name none of the formats {BAND!r}, {GRID!r}")
@@ -228,7 +231,9 @@ def _typed(name: str, value: object, dtypes: object) -> np.ndarray:
         raise ValueError(f"its {name} is {printable(str(value))}") from None
 
 
-def _band(folder: Path, arrays: dict[str, np.ndarray], spec: ArraySpec, n_there: int) -> NarrowBand:
+def _band(
+    folder: Folder, arrays: dict[str, np.ndarray], spec: ArraySpec, n_there: int
+) -> NarrowBand:
     tables = [arrays[name] for name in ("coordinates", "page_origin", "root", "pages")]
     check_index(BrickIndex(*tables))
     check_claim(2048 * len(arrays["coordinates"]), n_there, is_packed=True)
@@ -236,12 +241,12 @@ def _band(folder: Path, arrays: dict[str, np.ndarray], spec: ArraySpec, n_there:
     return band_of(arrays | {"values": values})
 
 
-def _grid(folder: Path, arrays: dict[str, np.ndarray], spec: ArraySpec, n_there: int) -> Grid:
+def _grid(folder: Folder, arrays: dict[str, np.ndarray], spec: ArraySpec, n_there: int) -> Grid:
     values = read_whole(folder, spec, n_there, is_full=spec.fill == spec.fill)  # unless it is NaN
     return grid_of(arrays | {"values": _nodes(values)})
 
 
-def _foreign(folder: Path, attributes: dict, n_there: int) -> Grid:
+def _foreign(folder: Folder, attributes: dict, n_there: int) -> Grid:
     name, voxel_size, origin = placed_array(attributes.get("ome"))
     spec = read_spec(folder / name)
     if len(spec.shape) != 3 or spec.dtype.kind != "f":

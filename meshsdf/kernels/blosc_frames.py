@@ -17,6 +17,8 @@ Nothing is read or written outside the ranges given, whatever the bytes say.
 import numpy as np
 from numba import njit
 
+from .raw_bytes import copy_bytes, word_at
+
 GOOD, DAMAGED, OTHER = 0, 1, 2
 """What becomes of a frame: opened; no valid frame of that size; a codec or shuffle not known."""
 
@@ -40,8 +42,7 @@ def open_frames(source, frames, target, places, scratch, states):
 @njit(cache=True, nogil=True)
 def _number(source, at):
     """The int32 at a place."""
-    low = np.int64(source[at]) | np.int64(source[at + 1]) << 8 | np.int64(source[at + 2]) << 16
-    number = low | np.int64(source[at + 3]) << 24
+    number = np.int64(word_at(source, at))
     return number - (1 << 32) if number >= 1 << 31 else number
 
 
@@ -60,8 +61,7 @@ def _open_frame(source, begin, end, target, t0, t1, scratch):
     if flags & _COPIED:
         if end - begin != _HEADER + size:
             return DAMAGED
-        for i in range(size):
-            target[t0 + i] = source[begin + _HEADER + i]
+        copy_bytes(source, begin + _HEADER, target, t0, size)
         return GOOD
     if flags >> 5 != _LZ4:
         return OTHER
@@ -102,8 +102,7 @@ def _open_block(source, at, end, target, place, length, streams):
             return False
         to = place + stream * part
         if size == part:
-            for i in range(part):
-                target[to + i] = source[at + i]
+            copy_bytes(source, at, target, to, part)
         elif not _open_lz4(source, at, at + size, target, to, to + part):
             return False
         at += size
@@ -114,9 +113,17 @@ def _open_block(source, at, end, target, place, length, streams):
 def _unshuffle(scratch, target, place, length, width):
     """Bring the bytes of each value together; what is no whole value stays at the end."""
     n = length // width
-    for byte in range(width):
+    values = target[place : place + length]
+    if width == 4:
+        # As below, but known when compiled
+        one, two, three, four = scratch[:n], scratch[n:], scratch[2 * n :], scratch[3 * n :]
         for i in range(n):
-            target[place + i * width + byte] = scratch[byte * n + i]
+            values[4 * i], values[4 * i + 1] = one[i], two[i]
+            values[4 * i + 2], values[4 * i + 3] = three[i], four[i]
+    else:
+        for byte in range(width):
+            for i in range(n):
+                values[i * width + byte] = scratch[byte * n + i]
     for i in range(n * width, length):
         target[place + i] = scratch[i]
 
@@ -131,8 +138,7 @@ def _open_lz4(source, at, end, target, place, stop):
         n_literals, at = _length(source, at, end, token >> 4)
         if at < 0 or at + n_literals > end or place + n_literals > stop:
             return False
-        for i in range(n_literals):
-            target[place + i] = source[at + i]
+        copy_bytes(source, at, target, place, n_literals)
         at += n_literals
         place += n_literals
         if at == end:

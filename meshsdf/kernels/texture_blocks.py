@@ -69,16 +69,7 @@ def block_values(
     n_plain, n_other = _find_steps(
         neighbors, masks, slots, tiles, kind, n_plain, n_other, numbers, out
     )
-    texels = pool.reshape(pool.size)
-    for n in range(n_plain):
-        q = numbers[n, PLAIN]
-        t = 512 * numbers[q, SLOT] + numbers[q, NODE]
-        dx, dy, dz = numbers[q, STEP_X], numbers[q, STEP_Y], numbers[q, STEP_Z]
-        out[q, 0], out[q, 1], out[q, 2], out[q, 3] = blend(
-            kind, texels[t], texels[t + dz], texels[t + dy], texels[t + dy + dz], texels[t + dx],
-            texels[t + dx + dz], texels[t + dx + dy], texels[t + dx + dy + dz], between[q, 0],
-            between[q, 1], between[q, 2],
-        )  # fmt: skip
+    _blend_plain(pool, kind, n_plain, numbers, between, out)
     n_other = _blend_across(
         neighbors, masks, slots, pool, kind, n_across, n_other, numbers, between, out
     )
@@ -139,6 +130,28 @@ def _find_steps(neighbors, masks, slots, tiles, kind, n_plain, n_other, numbers,
             numbers[n_other, OTHER] = q
             n_other += 1
     return kept, n_other
+
+
+@njit(cache=True, nogil=True)
+def _blend_plain(pool, kind, n_plain, numbers, between, out):
+    """Blend the cells in one brick, or across one face, whose corners are all in bricks."""
+    # A loop that only fetches has many reads under way at once
+    texels, corners = pool.reshape(pool.size), np.empty((BLOCK, 8), pool.dtype)
+    for n in range(n_plain):
+        q = numbers[n, PLAIN]
+        t = 512 * numbers[q, SLOT] + numbers[q, NODE]
+        dx, dy, dz = numbers[q, STEP_X], numbers[q, STEP_Y], numbers[q, STEP_Z]
+        corners[n, 0], corners[n, 1] = texels[t], texels[t + dz]
+        corners[n, 2], corners[n, 3] = texels[t + dy], texels[t + dy + dz]
+        corners[n, 4], corners[n, 5] = texels[t + dx], texels[t + dx + dz]
+        corners[n, 6], corners[n, 7] = texels[t + dx + dy], texels[t + dx + dy + dz]
+    for n in range(n_plain):
+        q = numbers[n, PLAIN]
+        out[q, 0], out[q, 1], out[q, 2], out[q, 3] = blend(
+            kind, corners[n, 0], corners[n, 1], corners[n, 2], corners[n, 3], corners[n, 4],
+            corners[n, 5], corners[n, 6], corners[n, 7], between[q, 0], between[q, 1],
+            between[q, 2],
+        )  # fmt: skip
 
 
 @njit(cache=True, nogil=True)

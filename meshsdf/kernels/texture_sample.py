@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet
+from .octree_tables import FIRST_GROUP, find_code, nearest_sheet
 from .texel_codes import F0, F1, decode
 from .texture_blocks import BLOCK, COLUMNS, block_values
 from .texture_lookup import ABSENT, needed, read_texel
@@ -100,40 +100,69 @@ def _scatter(colors, targets, shares, count, coarser, out):
 
 @njit(cache=True, nogil=True)
 def nearest(tables, slots, pool, tiles, kind, points, normals, begin, end, out):
-    """``out[n]`` = the nearest stored texel's numbers, at the finest level stored there."""
-    heads, pages, groups, sheets = tables.heads, tables.pages, tables.groups, tables.sheets
-    masks, top, scale = tables.masks, len(tables.heads), 1.0 / tables.texel
+    """``out[n]`` = the nearest stored texel's numbers, at the finest level stored there.
+
+    Block by block: where texels are, then to fetch them, then what they mean. A loop that only
+    fetches has many reads under way at once.
+    """
+    places, texels = np.empty(BLOCK, np.int64), np.empty(BLOCK, pool.dtype)
+    texels_of_all = pool.reshape(pool.size)
     every_normal = int(len(normals) > 1)
-    code, slot = np.int32(NO_ENTRY), np.int32(ABSENT)
-    at_x, at_y, at_z = np.int64(-1 << 62), np.int64(0), np.int64(0)
-    for n in range(begin, end):
-        m = n * every_normal
+    for first in range(begin, end, BLOCK):
+        count = min(BLOCK, end - first)
+        _find_texels(tables, slots, points, first, count, places)
+        for q in range(count):
+            texels[q] = texels_of_all[max(places[q], 0)]
+        for q in range(count):
+            n = first + q
+            if places[q] >= 0:
+                r, g, b, a = decode(kind, texels[q])
+            else:
+                m = n * every_normal
+                r, g, b, a = _nearest_of_levels(
+                    tables, slots, pool, tiles, kind, points[n, 0], points[n, 1], points[n, 2],
+                    normals[m, 0], normals[m, 1], normals[m, 2],
+                )  # fmt: skip
+            out[n, 0], out[n, 1], out[n, 2], out[n, 3] = r, g, b, a
+
+
+@njit(cache=True, nogil=True)
+def _find_texels(tables, slots, points, first, count, places):
+    """``places[q]`` = which of all texels in the pool is nearest to ``points[first + q]``.
+
+    -1 unless it is of the finest level, in a brick of one sheet that is stored as more than a tile.
+    """
+    heads, pages, masks, scale = tables.heads, tables.pages, tables.masks, 1.0 / tables.texel
+    for q in range(count):
+        n = first + q
         x, y, z = points[n, 0] * scale, points[n, 1] * scale, points[n, 2] * scale
-        r, g, b, a = F0, F0, F0, F0
-        if not (abs(x) < 4.0e15 and abs(y) < 4.0e15 and abs(z) < 4.0e15):
-            out[n, 0] = out[n, 1] = out[n, 2] = out[n, 3] = np.nan
-            continue
-        i, j, k = math.floor(x + 0.5), math.floor(y + 0.5), math.floor(z + 0.5)
-        bx, by, bz = i >> 3, j >> 3, k >> 3
-        if (bx ^ at_x) | (by ^ at_y) | (bz ^ at_z):
-            at_x, at_y, at_z = bx, by, bz
-            code = find_code(heads, pages, 0, bx, by, bz)
-            slot = slots[code] if code >= 0 else np.int32(ABSENT)
-        if slot >= 0:
-            row, bit = i & 7, ((j & 7) << 3) + (k & 7)
-            if (masks[code, row] >> np.uint64(bit)) & np.uint64(1):
-                r, g, b, a = decode(kind, pool[slot, (row << 6) + bit])
-                out[n, 0], out[n, 1], out[n, 2], out[n, 3] = r, g, b, a
-                continue
-        for level in range(top):
+        place = np.int64(-1)
+        if abs(x) < 4.0e15 and abs(y) < 4.0e15 and abs(z) < 4.0e15:
             i, j, k = math.floor(x + 0.5), math.floor(y + 0.5), math.floor(z + 0.5)
-            e = find_code(heads, pages, level, i >> 3, j >> 3, k >> 3)
-            if e <= FIRST_GROUP:
-                e = nearest_sheet(groups, sheets, e, normals[m, 0], normals[m, 1], normals[m, 2])
-            if e >= 0 and slots[e] != ABSENT:
-                t = ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)
-                if needed(masks, e, t):
-                    r, g, b, a = read_texel(kind, slots[e], pool, tiles, t)
-                    break
-            x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
-        out[n, 0], out[n, 1], out[n, 2], out[n, 3] = r, g, b, a
+            entry = find_code(heads, pages, 0, i >> 3, j >> 3, k >> 3)
+            if entry >= 0:
+                slot, row, bit = np.int64(slots[entry]), i & 7, ((j & 7) << 3) + (k & 7)
+                if slot >= 0 and (masks[entry, row] >> np.uint64(bit)) & np.uint64(1):
+                    place = 512 * slot + (row << 6) + bit
+        places[q] = place
+
+
+@njit(cache=True, nogil=True)
+def _nearest_of_levels(tables, slots, pool, tiles, kind, x, y, z, nx, ny, nz):
+    """r, g, b, a of the nearest texel of the finest level that stores one there."""
+    scale = 1.0 / tables.texel
+    x, y, z = x * scale, y * scale, z * scale
+    if not (abs(x) < 4.0e15 and abs(y) < 4.0e15 and abs(z) < 4.0e15):
+        nan = np.float32(np.nan)
+        return nan, nan, nan, nan
+    for level in range(len(tables.heads)):
+        i, j, k = math.floor(x + 0.5), math.floor(y + 0.5), math.floor(z + 0.5)
+        e = find_code(tables.heads, tables.pages, level, i >> 3, j >> 3, k >> 3)
+        if e <= FIRST_GROUP:
+            e = nearest_sheet(tables.groups, tables.sheets, e, nx, ny, nz)
+        if e >= 0 and slots[e] != ABSENT:
+            t = ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)
+            if needed(tables.masks, e, t):
+                return read_texel(kind, slots[e], pool, tiles, t)
+        x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
+    return F0, F0, F0, F0

@@ -33,7 +33,7 @@ def small_files(folder):
     band = small_band()
     fog = Grid(np.random.default_rng(1).random((9, 9, 5), np.float32), 0.5, np.ones(3))
     fog.values[:, 4:] = 0
-    for name in ("none", "active", "zip"):
+    for name in ("none", "active", "zip", "blosc"):
         write_vdb(folder / f"{name}.vdb", band, compression=name)
     write_vdb(folder / "half.vdb", band, compression="zip", half=True)
     write_vdb(folder / "fog.vdb", fog, grid_class="fog volume")
@@ -144,7 +144,7 @@ def test_compression_bombs_are_refused_unopened(tmp_path):
     bomb = zlib.compress(bytes(2**21), 9)[:2100]
     size = struct.pack("<q", len(bomb))
     refuse(path, "do not give the 2048 bytes", flags=1, leaf_size=size, leaf_values=bomb)
-    # A Blosc frame that claims to be larger than a leaf; a sound one first, to compile the kernel
+    # A Blosc frame that claims to be larger than a leaf; a sound one first, to compile the kernels
     plain = struct.pack("<BBBBIII", 2, 1, 2, 4, 2048, 2048, 2064) + bytes(2048)
     size = struct.pack("<q", len(plain))
     path.write_bytes(vdb_bytes(flags=4, leaf_size=size, leaf_values=plain))

@@ -59,8 +59,6 @@ def ours(tmp_path_factory):
     written = {}
     forms = itertools.product(["none", "active", "zip", "blosc"], [False, True])
     for number, (compression, half) in enumerate(forms):
-        if compression == "blosc":
-            pytest.importorskip("numcodecs")
         scalars = random_grid(
             number, is_half=half, matrix=AFFINE if half else np.diag([2.0, 2, 2, 1])
         )

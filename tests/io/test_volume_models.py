@@ -20,7 +20,7 @@ RESOLUTION = 64
 
 NAME = "left torso"
 
-SPARSE = {".npz": {}, ".vdb": {"name": NAME}, ".zarr": {}}
+SPARSE = {".npz": {}, ".vdb": {"name": NAME}, ".zarr": {}, ".zarr.zip": {}}
 """Formats of bands, with options of their writers."""
 
 IMAGES = {"atlas": {"up": "y"}, "parts": {"layout": "parts"}}

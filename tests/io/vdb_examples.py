@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from meshsdf.grid import BrickIndex, NarrowBand
 from meshsdf.grid.brick_grid import node_mask, node_words
@@ -180,3 +181,19 @@ def split(rows: np.ndarray, background: np.ndarray) -> np.ndarray:
 
 def _rows(places, side, active, values) -> np.ndarray:
     return np.column_stack([places, np.full(len(places), side), active, values.astype(float)])
+
+
+def assert_same_band(a: NarrowBand, b: NarrowBand):
+    """Every bit of a band but for the order and the origin of its pages."""
+    for field in dataclasses.fields(NarrowBand):
+        if field.name == "index":
+            continue
+        x, y = getattr(a, field.name), getattr(b, field.name)
+        assert type(x) is type(y), field.name
+        same = x.tobytes() == y.tobytes() if isinstance(x, np.ndarray) else x == y
+        assert same, field.name
+    assert_array_equal(a.index.coordinates, b.index.coordinates)
+    random = np.random.default_rng(0)
+    for reach in (50, 700, 5000, 10**6):
+        nodes = random.integers(-reach, reach, (3000, 3))
+        assert_array_equal(a.value_at(nodes), b.value_at(nodes))

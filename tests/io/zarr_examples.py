@@ -1,6 +1,7 @@
 """What the tests of .zarr volumes share."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,11 +20,12 @@ def assert_equal(a, b):
 
 
 def foreign(path, values, compressors="auto", axes="zyx", transformations=None, **options):
-    """An OME-Zarr image that the package zarr wrote."""
+    """An OME-Zarr image that the package zarr wrote, to a folder or a store of its own."""
     zarr = pytest.importorskip("zarr", reason="the package zarr is not installed")
     if transformations is None:
         transformations = [{"type": "scale", "scale": [0.5, 0.5, 0.5]}]
-    group = zarr.create_group(str(path), zarr_format=3, overwrite=True)
+    is_path = isinstance(path, Path)
+    group = zarr.create_group(str(path) if is_path else path, zarr_format=3, overwrite=is_path)
     array = group.create_array(
         "s0", shape=values.shape, dtype=values.dtype, compressors=compressors, **options
     )

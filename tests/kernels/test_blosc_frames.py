@@ -68,8 +68,9 @@ def test_other_codecs_are_left_to_their_library():
     for name, shuffle in [(b"zstd", 1), (b"zlib", 1), (b"blosclz", 1), (b"lz4", 2)]:
         frame = codec.compress(values, name, 5, shuffle)
         assert opened(frame, 4000)[0] == OTHER
-        data = blosc_decode(b"--" + frame, [(2, 2 + len(frame))], [4000])
-        assert data == values.tobytes()
+        window, target = np.frombuffer(bytearray(b"--" + frame), np.uint8), np.zeros(4002, np.uint8)
+        blosc_decode(window, np.array([[2, 2 + len(frame)]]), target, np.array([[1, 4001]]))
+        assert target.tobytes() == b"\0" + values.tobytes() + b"\0"
 
 
 def test_no_damage_reaches_beyond_its_frame():

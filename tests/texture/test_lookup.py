@@ -151,6 +151,36 @@ def test_nearest_is_the_texel_at_the_nearest_node_of_the_finest_stored_level():
                 break
 
 
+def test_nearest_lookups_tell_sides_apart_and_know_no_order_nor_what_is_not_finite():
+    texture = VolumeTexture.around(box_mesh((20.0, 14.0, 0.3), center=(0.3, 0.2, 0.4)), texel=1.0)
+    layer = texture.add_layer()
+
+    def by_side(points, normals):
+        return np.where(normals[:, 2:] > 0, [1.0, 0, 0, 1], [0, 0, 1.0, 1])
+
+    bake(texture, layer, by_side)
+    random = np.random.default_rng(3)
+    points = random.uniform([-8.7, -5.8, 0.25], [9.3, 6.2, 0.55], (5000, 3))
+    normals = np.zeros((5000, 3))
+    normals[:, 2] = random.choice([-1.0, 1.0], 5000)
+    points[::9] *= np.array([1, np.nan, 1])
+    wanted = by_side(points, normals)
+    wanted[::9] = np.nan
+
+    def nearest(points, normals):
+        return look_up(
+            texture.octree, layer.slots, texture.pool.arrays["base"],
+            texture.tiles.arrays["base"], texture.channels["base"].kind, points, normals,
+            interpolate=False,
+        )  # fmt: skip
+
+    assert_array_equal(nearest(points, normals), wanted)
+    order = random.permutation(5000)
+    assert_array_equal(nearest(points[order], normals[order]), wanted[order])
+    few = [nearest(points[n : n + 7], normals[n : n + 7]) for n in range(0, 700, 7)]
+    assert_array_equal(np.concatenate(few), wanted[:700])
+
+
 def test_half_and_srgb8_agree_to_the_step_of_eight_bits():
     points = sample_surface(BALL, 10_000, seed=2).points
     shown_by = [half_painted(BALL, 64, base=base)[0].colors(points) for base in ("half", "srgb8")]
