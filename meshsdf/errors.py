@@ -69,5 +69,9 @@ class IoError(MeshsdfError):
     """A file cannot be read or written."""
 
 
+class ServerError(MeshsdfError):
+    """The painting page's server is asked for what it cannot or may not do."""
+
+
 class MemoryLimitError(MeshsdfError):
     """The work would not fit in memory; said before it starts."""

@@ -28,6 +28,7 @@ COMMANDS = {
     "sample": "Points with their signed distances to a mesh, for learning.",
     "render": "Draw a mesh or a volume, or how far it is from another mesh.",
     "texture": "Colour in space: from meshes, formulas and images; out to files.",
+    "paint": "Paint on a mesh in a browser, without texture coordinates.",
     "demo": "Make a mesh, check, convert and round-trip it, and draw pictures.",
 }
 GARBAGE_AFTER = 50_000  # new objects: imports make far more, and nearly all of them stay

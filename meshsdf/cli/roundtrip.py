@@ -38,7 +38,7 @@ from .reports import check_reports, limit_words, report_option, write_reports
     "methods",
     type=Names("marching-cubes", "dual-contouring", "surface-nets"),
     default=("marching-cubes",),
-    help="How the surface is extracted; with several, they are compared.  [default: marching-cubes]",
+    help="How the surface is extracted; several are compared.  [default: marching-cubes]",
 )
 @half_width_option
 @sign_option

@@ -38,6 +38,19 @@ class Setting(click.ParamType):
         return name.strip().replace("-", "_"), text.strip()
 
 
+class Level(click.ParamType):
+    """A level of detail: a number, or "auto"."""
+
+    name = "auto|0|1|..."
+
+    def convert(self, value, param, ctx):
+        if value == "auto" or isinstance(value, int):
+            return value
+        if value.isascii() and value.isdigit():
+            return int(value)
+        self.fail(f"{value!r} is no level; use auto, or 0 for the finest texels", param, ctx)
+
+
 def made_options(function: Callable) -> Callable:
     """What all commands that make textures share."""
     for option in reversed(
@@ -54,6 +67,14 @@ def made_options(function: Callable) -> Callable:
                 default="srgb8",
                 show_default=True,
                 help="How colours are kept: 8 bits in sRGB, or linear in half precision.",
+            ),
+            click.option(
+                "--level",
+                type=Level(),
+                default="auto",
+                show_default=True,
+                help="Detail to keep: 0 all, 1 half as fine, ...; auto fine bricks only where "
+                "coarser ones would be off by more than 1/255.",
             ),
             click.option("--add", is_flag=True, help="Add a layer to OUT, which exists."),
             click.option("--layer", default="", help="Name of the layer."),
@@ -97,23 +118,23 @@ def bake(mesh: str, out: str, **options) -> int:
               expose_value=False, help="Tell kinds and parameters, and stop.")  # fmt: skip
 @made_options
 def procedural(mesh: str, out: str, kind: str, parameters, **options) -> int:
-    """Fill the surface of MESH with a solid texture, OUT (.mtex).
+    """Fill the surface of MESH with a solid texture, OUT (.mtex), or with one that sees its shape:
+    edge-wear, cavity-dirt, thickness.
 
     Lengths among the parameters are in world units. Without scale=... the pattern's unit is the
-    longest side of the mesh's box.
+    longest side of the mesh's box, and so it is for lengths that see the shape.
     """
     console = _console("procedural", options)
-    from ..texture.procedural import parameters_of
+    from ..texture.procedural import lengths_for
     from ..texture.procedural import procedural as make
 
     settings = dict(parameters)
-    make(kind, **settings)  # wrong names are told before the mesh is read
-    has_scale = "scale" in {one.name for one in parameters_of(kind)}
+    make(kind, signed_distance=len, **settings)  # wrong names are told before the mesh is read
 
     def operation(texture, loaded):
-        if has_scale and "scale" not in settings:
-            settings["scale"] = repr(float(loaded.box.size.max()) or 1.0)
-        return "bake", {"texture_kind": kind, **settings}
+        lengths = lengths_for(kind, loaded.box.size.max())
+        known = {name: repr(length) for name, length in lengths.items()} | settings
+        return "bake", {"texture_kind": kind, **known}
 
     return _make(console, mesh, out, operation, options | {"default": kind})
 
@@ -122,8 +143,9 @@ def _list(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     if not value:
         return
     from ..texture.procedural import PROCEDURALS, parameters_of
+    from ..texture.sdf_patterns import ON_SHAPE
 
-    for kind in sorted(PROCEDURALS):
+    for kind in [*sorted(PROCEDURALS), *sorted(ON_SHAPE)]:
         click.echo(kind)
         for one in parameters_of(kind):
             click.echo(f"  {one.name}={_text(one.default)}  {one.meaning}")
@@ -240,7 +262,7 @@ def _make(console: Console, mesh: str, out: str, operation: Callable, options: d
             project.apply(Operation("add-layer", {"name": name}))
             number = project.texture.layers[-1].number
             kind, params = operation(project.texture, loaded)
-            project.apply(Operation(kind, {"layer": number, **params}))
+            project.apply(Operation(kind, {"layer": number, "level": options["level"], **params}))
         with console.stage("write"):
             project.checkpoint()
         facts = texture_facts(project)

@@ -4,11 +4,15 @@ import numpy as np
 from numba import njit
 
 from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet
-from .sheets import decode_normal
+from .sheets import MAX_SHEETS, decode_normal
 from .texel_codes import decode, encode
 from .texture_lookup import ABSENT, FIRST_TILE, needed
 
 UNCHANGED, CHANGED = 0, 1
+MISSING, UNSTORED, STORED, ASIDE = 0, 1, 2, 4  # the last: looks another way than the sheet
+SIDE = 17  # texels along an axis that the 8 of a brick are means of
+AROUND = SIDE**3
+PARENTS = 8 * MAX_SHEETS
 
 
 @njit(cache=True, nogil=True)
@@ -20,6 +24,9 @@ def mip_texels(tables, entries, slots, pool, tiles, kind, begin, end, texels, st
     texel keeps its number where some of these are not stored. ``state[i]`` is CHANGED or not.
     """
     codes = np.empty(27, np.int32)
+    around = np.empty((MAX_SHEETS, AROUND, 4), np.float32)
+    words = np.empty((MAX_SHEETS, AROUND), pool.dtype)
+    states = np.empty((MAX_SHEETS, AROUND), np.uint8)
     for i in range(begin, end):
         e = entries[i]
         slot = slots[e]
@@ -30,10 +37,11 @@ def mip_texels(tables, entries, slots, pool, tiles, kind, begin, end, texels, st
                 2 * tables.bricks[e, 2] + n % 3 - 1,
             )  # fmt: skip
         tile = _common_tile(tables.groups, codes, slots)
-        parted = find_code(
-            tables.heads, tables.pages, tables.levels[e], tables.bricks[e, 0],
-            tables.bricks[e, 1], tables.bricks[e, 2],
-        ) <= FIRST_GROUP  # fmt: skip
+        n_sheets = 0
+        if tile > FIRST_TILE:
+            n_sheets = _gather(
+                tables, codes, slots, pool, tiles, kind, np.int64(e), around, words, states
+            )
         state[i] = UNCHANGED
         for t in range(512):
             if not needed(tables.masks, e, t):
@@ -42,12 +50,40 @@ def mip_texels(tables, entries, slots, pool, tiles, kind, begin, end, texels, st
             new = old
             if tile <= FIRST_TILE:
                 new = tiles[FIRST_TILE - tile]
+            elif n_sheets == 0:
+                new = _mean_of_one(around[0], words[0], states[0], kind, t, old)
             else:
-                sheet = np.int32(e) if parted else np.int32(NO_ENTRY)
-                new = _mean(tables, codes, slots, pool, tiles, kind, sheet, t, old)
+                new = _mean(around, words, states, n_sheets, kind, t, old)
             texels[i, t] = new
             if new != old:
                 state[i] = CHANGED
+
+
+@njit(cache=True, nogil=True)
+def parents_of(tables, entries, parents):
+    """``parents[i]`` (16,) = the entries one level up that have means of texels of ``entries[i]``.
+
+    Texels 8 b ... 8 b + 7 along an axis count in 4 b ... 4 b + 4 of the level above: in one or two
+    bricks, of two sheets at most. NO_ENTRY fills the row where there are fewer.
+    """
+    for i in range(len(entries)):
+        e = entries[i]
+        b = tables.bricks[e]
+        at = 0
+        for x in range(b[0] >> 1, ((b[0] + 1) >> 1) + 1):
+            for y in range(b[1] >> 1, ((b[1] + 1) >> 1) + 1):
+                for z in range(b[2] >> 1, ((b[2] + 1) >> 1) + 1):
+                    code = find_code(tables.heads, tables.pages, tables.levels[e] + 1, x, y, z)
+                    first, count = code, 1
+                    if code <= FIRST_GROUP:
+                        first = tables.groups[FIRST_GROUP - code, 0]
+                        count = tables.groups[FIRST_GROUP - code, 1]
+                    if code == NO_ENTRY:
+                        continue
+                    for s in range(count):
+                        parents[i, at] = first + s
+                        at += 1
+        parents[i, at:] = NO_ENTRY
 
 
 @njit(cache=True, nogil=True)
@@ -69,63 +105,134 @@ def _common_tile(groups, codes, slots):
 
 
 @njit(cache=True, nogil=True)
-def _mean(tables, codes, slots, pool, tiles, kind, sheet, t, old):
-    """The weighted mean around texel t; of those that look its way, or if none does, of all."""
-    for own in range(2 if sheet >= 0 else 1):
-        sr, sg, sb, sa, sw = 0.0, 0.0, 0.0, 0.0, 0.0
-        first = old
-        same = True
-        for d in range(27):
-            dx, dy, dz = d // 9 - 1, d // 3 % 3 - 1, d % 3 - 1
-            x, y, z = 2 * (t >> 6) + dx, 2 * ((t >> 3) & 7) + dy, 2 * (t & 7) + dz
-            code = codes[9 * ((x >> 3) + 1) + 3 * ((y >> 3) + 1) + (z >> 3) + 1]
-            if code == NO_ENTRY:
+def _gather(tables, codes, slots, pool, tiles, kind, own, around, words, states):
+    """Decode all texels that those of entry ``own`` are means of: -1 to 15 along every axis.
+
+    ``words[s]`` and so on are of the s-th sheet of each brick. Returns how many there are of one at
+    most; 0 if there is one of each, and of the brick of ``own``, too.
+    """
+    group = find_code(
+        tables.heads, tables.pages, tables.levels[own], tables.bricks[own, 0],
+        tables.bricks[own, 1], tables.bricks[own, 2],
+    )  # fmt: skip
+    states[:] = MISSING
+    n_sheets = 1
+    for n in range(27):
+        code = codes[n]
+        if code == NO_ENTRY:
+            continue
+        first, count = code, 1
+        if code <= FIRST_GROUP:
+            first = tables.groups[FIRST_GROUP - code, 0]
+            count = tables.groups[FIRST_GROUP - code, 1]
+            n_sheets = max(n_sheets, count)
+        for s in range(count):
+            _gather_entry(
+                tables, first + s, n, slots[first + s], pool, tiles, kind, own, group, around[s],
+                words[s], states[s],
+            )  # fmt: skip
+    return 0 if n_sheets == 1 and group > FIRST_GROUP else n_sheets
+
+
+@njit(cache=True, nogil=True)
+def _gather_entry(
+    tables, e, n, slot, pool, tiles, kind, own, group, around, words, states
+):  # fmt: skip
+    """Decode those of one entry, the ``n``-th brick of 27; see `_gather`."""
+    bx, by, bz = n // 9, n // 3 % 3, n % 3
+    row = SIDE * (SIDE * (8 * bx - 7) + 8 * by - 7) + 8 * bz - 7
+    for x in range(7 if bx == 0 else 0, 8):
+        for y in range(7 if by == 0 else 0, 8):
+            bits = (tables.masks[e, x] >> np.uint64(8 * y)) & np.uint64(255)
+            if bits == np.uint64(0):
                 continue
-            entry, count = code, 1
-            if code <= FIRST_GROUP:
-                entry = tables.groups[FIRST_GROUP - code, 0]
-                count = tables.groups[FIRST_GROUP - code, 1]
-            at = ((x & 7) << 6) + ((y & 7) << 3) + (z & 7)
-            weight = (2 - abs(dx)) * (2 - abs(dy)) * (2 - abs(dz))
-            for e in range(entry, entry + count):
-                if not needed(tables.masks, e, at):
+            for z in range(7 if bz == 0 else 0, 8):
+                if (bits >> np.uint64(z)) & np.uint64(1) == np.uint64(0):
                     continue
-                if sheet >= 0 and own == 0 and not _looks_along(tables, sheet, e, at):
-                    continue
-                slot = slots[e]
+                at, t = row + SIDE * (SIDE * x + y) + z, (x << 6) + (y << 3) + z
+                states[at] = UNSTORED if slot == ABSENT else STORED
+                if group <= FIRST_GROUP and not _looks_along(tables, own, group, e, t):
+                    states[at] |= ASIDE
                 if slot == ABSENT:
+                    continue
+                word = pool[slot, t] if slot >= 0 else tiles[FIRST_TILE - slot]
+                words[at] = word
+                r, g, b, a = decode(kind, word)
+                around[at, 0], around[at, 1], around[at, 2], around[at, 3] = r, g, b, a
+
+
+@njit(cache=True, nogil=True)
+def _mean(around, words, states, n_sheets, kind, t, old):
+    """The weighted mean around texel t; of those that look its way, or if none does, of all."""
+    for left_out in (ASIDE, 0):
+        sr, sg, sb, sa, sw = 0.0, 0.0, 0.0, 0.0, 0.0
+        first, same = old, True
+        for d in range(27):
+            dx, dy, dz = d // 9, d // 3 % 3, d % 3
+            at = SIDE * (SIDE * (2 * (t >> 6) + dx) + 2 * ((t >> 3) & 7) + dy) + 2 * (t & 7) + dz
+            weight = (1 + (dx == 1)) * (1 + (dy == 1)) * (1 + (dz == 1))
+            for s in range(n_sheets):
+                state = states[s, at]
+                if state == MISSING or state & left_out:
+                    continue
+                if state & UNSTORED:
                     return old
-                texel = pool[slot, at] if slot >= 0 else tiles[FIRST_TILE - slot]
+                texel = words[s, at]
                 if sw == 0.0:
                     first = texel
                 same &= texel == first
-                r, g, b, a = decode(kind, texel)
+                r, g, b, a = around[s, at, 0], around[s, at, 1], around[s, at, 2], around[s, at, 3]
                 w = weight * np.float64(a)
                 sr, sg, sb, sa, sw = sr + w * r, sg + w * g, sb + w * b, sa + w, sw + weight
         if sw > 0.0:
-            if same:
-                return first
-            scale = 1.0 / sa if sa > 0.0 else 0.0
-            word = encode(
-                kind, np.float32(sr * scale), np.float32(sg * scale), np.float32(sb * scale),
-                np.float32(sa / sw),
-            )  # fmt: skip
-            return pool.dtype.type(word)
+            return first if same else words.dtype.type(_word(kind, sr, sg, sb, sa, sw))
     return old
 
 
 @njit(cache=True, nogil=True)
-def _looks_along(tables, sheet, e, t):
-    """Whether texel t of entry e looks the way of ``sheet`` more than of its brick's others."""
+def _mean_of_one(around, words, states, kind, t, old):
+    """`_mean` where no brick has a second sheet, to the same bits."""
+    sr, sg, sb, sa, sw = 0.0, 0.0, 0.0, 0.0, 0.0
+    first, same = old, True
+    for dx in range(3):
+        for dy in range(3):
+            row = SIDE * (SIDE * (2 * (t >> 6) + dx) + 2 * ((t >> 3) & 7) + dy) + 2 * (t & 7)
+            for dz in range(3):
+                at = row + dz
+                if states[at] == MISSING:
+                    continue
+                if states[at] == UNSTORED:
+                    return old
+                weight = (1 + (dx == 1)) * (1 + (dy == 1)) * (1 + (dz == 1))
+                if sw == 0.0:
+                    first = words[at]
+                same &= words[at] == first
+                w = weight * np.float64(around[at, 3])
+                sr, sg, sb = sr + w * around[at, 0], sg + w * around[at, 1], sb + w * around[at, 2]
+                sa, sw = sa + w, sw + weight
+    if sw == 0.0:
+        return old
+    return first if same else words.dtype.type(_word(kind, sr, sg, sb, sa, sw))
+
+
+@njit(cache=True, nogil=True)
+def _word(kind, sr, sg, sb, sa, sw):
+    """The texel of sums of weighted colours, of their alpha, and of weights."""
+    scale = 1.0 / sa if sa > 0.0 else 0.0
+    return encode(
+        kind, np.float32(sr * scale), np.float32(sg * scale), np.float32(sb * scale),
+        np.float32(sa / sw),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _looks_along(tables, sheet, group, e, t):
+    """Whether texel t of entry e looks the way of ``sheet`` more than of its ``group``'s others."""
     at = tables.texel_first[e]
     for word in range(t >> 6):
         at += _bits(tables.masks[e, word])
     at += _bits(tables.masks[e, t >> 6] & ((np.uint64(1) << np.uint64(t & 63)) - np.uint64(1)))
     nx, ny, nz = decode_normal(tables.texel_normals[at, 0], tables.texel_normals[at, 1])
-    group = find_code(
-        tables.heads, tables.pages, tables.levels[sheet], tables.bricks[sheet, 0],
-        tables.bricks[sheet, 1], tables.bricks[sheet, 2],
-    )  # fmt: skip
     return nearest_sheet(tables.groups, tables.sheets, group, nx, ny, nz) == sheet
 
 

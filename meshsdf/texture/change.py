@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Int32
 
 from ..errors import TextureError
-from ..kernels.texture_lookup import ABSENT
+from ..kernels.texture_lookup import ABSENT, FIRST_TILE
 from .layer import Layer
 from .octree import Entries
 from .volume_texture import VolumeTexture
@@ -198,18 +198,36 @@ def recording(texture: VolumeTexture) -> Iterator[Change]:
         texture.pool.end_recording()
 
 
+def changed_since(texture: VolumeTexture, layer: Layer, slots: Slots) -> Change:
+    """What became of one layer since its slots were these, which the caller held all the while."""
+    stack = Stack.of(texture)
+    change = Change(stack, stack)
+    _collect_layer(texture, change, layer, slots)
+    return change
+
+
+def put_back(texture: VolumeTexture, layer: Layer, slots: Slots) -> None:
+    """Let a layer store what it stored when its slots were these, held by the caller since."""
+    entries = np.flatnonzero(layer.slots != slots).astype(np.int32)
+    _swap(texture, layer, entries, slots[entries])
+
+
 def _collect(texture: VolumeTexture, change: Change, before: dict[Layer, Slots]) -> None:
     """Fill the change, and hold its slots."""
     change.after = Stack.of(texture)
     for layer in dict.fromkeys([*before, *texture.layers]):
         old = before[layer] if layer in before else np.full_like(layer.slots, ABSENT)
-        entries = np.flatnonzero(old != layer.slots).astype(np.int32)
-        entries = _really_changed(texture, layer, entries, old)
-        if len(entries):
-            one = SlotChange(layer, entries, old[entries], layer.slots[entries])
-            texture.pool.hold(one.before)
-            texture.pool.hold(one.after)
-            change.slots.append(one)
+        _collect_layer(texture, change, layer, old)
+
+
+def _collect_layer(texture: VolumeTexture, change: Change, layer: Layer, old: Slots) -> None:
+    entries = np.flatnonzero(old != layer.slots).astype(np.int32)
+    entries = _really_changed(texture, layer, entries, old)
+    if len(entries):
+        one = SlotChange(layer, entries, old[entries], layer.slots[entries])
+        texture.pool.hold(one.before)
+        texture.pool.hold(one.after)
+        change.slots.append(one)
 
 
 def _really_changed(texture: VolumeTexture, layer: Layer, entries: Entries, old: Slots) -> Entries:
@@ -217,26 +235,36 @@ def _really_changed(texture: VolumeTexture, layer: Layer, entries: Entries, old:
     new = layer.slots
     bricks = entries[new[entries] >= 0]
     bricks = bricks[old[bricks] != ABSENT]
-    same = np.zeros(len(bricks), bool)
-    for begin in range(0, len(bricks), BRICKS_AT_ONCE):
-        part = slice(begin, begin + BRICKS_AT_ONCE)
-        same[part] = _same_texels(texture, bricks[part], old[bricks[part]], new[bricks[part]])
+    same = same_texels(texture, bricks, old[bricks], new[bricks])
     _swap(texture, layer, bricks[same], old[bricks[same]])
     return entries[~np.isin(entries, bricks[same])]
 
 
-def _same_texels(texture: VolumeTexture, entries: Entries, old: Slots, new: Slots) -> np.ndarray:
-    """Whether bricks hold the same as other bricks or tiles, where texels exist."""
-    is_tile = old < 0
-    bits = np.unpackbits(texture.octree.tables.masks[entries].view(np.uint8), bitorder="little")
-    unneeded = bits.reshape(len(entries), -1) == 0
+def same_texels(texture: VolumeTexture, entries: Entries, old: Slots, new: Slots) -> np.ndarray:
+    """(n,) bool: whether entries hold the same as bricks or tiles, where texels exist."""
     same = np.ones(len(entries), bool)
-    for name, array in texture.pool.arrays.items():
-        texels = np.where(is_tile[:, None], array.dtype.type(0), array[np.maximum(old, 0)])
-        for i in np.flatnonzero(is_tile):
-            texels[i] = texture.tiles.texel(int(old[i]))[name]
-        same &= ((texels == array[new]) | unneeded).all(axis=1)
+    for begin in range(0, len(entries), BRICKS_AT_ONCE):
+        part = slice(begin, begin + BRICKS_AT_ONCE)
+        bits = texture.octree.tables.masks[entries[part]].view(np.uint8)
+        unneeded = np.unpackbits(bits, axis=1, bitorder="little") == 0
+        any_tile = bool((old[part] < 0).any() or (new[part] < 0).any())
+        for name in texture.tiles.arrays if any_tile else texture.pool.arrays:
+            before, after = (_texels(texture, name, slots[part]) for slots in (old, new))
+            same[part] &= ((before == after) | unneeded).all(axis=1)
     return same
+
+
+def _texels(texture: VolumeTexture, name: str, slots: Slots) -> np.ndarray:
+    """(n, 512) texels of a channel in bricks or tiles."""
+    tiles, channel = texture.tiles.arrays[name], texture.channels[name]
+    is_tile = slots < 0
+    pool = texture.pool.arrays.get(name)
+    if pool is None:
+        texels = np.full((len(slots), 512), channel.nothing, channel.dtype)
+    else:
+        texels = pool[np.maximum(slots, 0)]
+    texels[is_tile] = tiles[FIRST_TILE - slots[is_tile]][:, None]
+    return texels
 
 
 def _swap(texture: VolumeTexture, layer: Layer, entries: Entries, slots: Slots) -> None:

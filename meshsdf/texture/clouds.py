@@ -21,8 +21,8 @@ TABLE_STEPS = 2048
 class Clouds(Solid):
     """White clouds in a sky.
 
-    The share of white is ``smoothstep(level - softness, level + softness, fbm(p))``; colours may
-    have alpha, such as a sky that is clear.
+    The share of white is ``smoothstep(threshold - softness, threshold + softness, fbm(p))``;
+    colours may have alpha, such as a sky that is clear.
 
     References
     ----------
@@ -32,7 +32,7 @@ class Clouds(Solid):
     _strewn: ClassVar[bool] = True
 
     size: Number = field(default=0.6, metadata=means("length", "of the largest clouds"))
-    level: Number = field(
+    threshold: Number = field(
         default=0.05, metadata=means("number", "of noise, in [-1, 1]: lower means more clouds")
     )
     softness: Number = field(default=0.3, metadata=means("share", "from edge to middle, in noise"))
@@ -47,7 +47,7 @@ class Clouds(Solid):
         noise = fbm(points / self.size, wide, octaves=self.octaves, seed=self.seed)
         # The interval of the same spread as the noise that the filter has taken away
         taken = np.sqrt(12) * removed_spread(wide, octaves=self.octaves)
-        white = _share_of_white(self.level, max(self.softness, 1e-3))
+        white = _share_of_white(self.threshold, max(self.softness, 1e-3))
         share = white(noise / SPAN, taken / SPAN)
         return blend(premultiplied(self.sky), premultiplied(self.cloud), share)
 
@@ -59,7 +59,7 @@ class Clouds(Solid):
 
 
 @lru_cache(maxsize=64)
-def _share_of_white(level: float, softness: float) -> Periodic:
+def _share_of_white(threshold: float, softness: float) -> Periodic:
     noise = SPAN * np.arange(TABLE_STEPS) / TABLE_STEPS
     noise[noise >= 1.5] -= SPAN
-    return Periodic(smoothstep(level - softness, level + softness, noise))
+    return Periodic(smoothstep(threshold - softness, threshold + softness, noise))

@@ -12,10 +12,11 @@ from jaxtyping import Float32
 
 from ..errors import TextureError
 from ..kernels.blending import MODES, NORMAL
-from ..kernels.composite import add_up, lay_over, layer_values
+from ..kernels.composite import add_up, lay_over
+from ..kernels.node_values import known_slots, layer_values
 from ..kernels.parallel import even_ranges, run_pieces
 from ..kernels.texel_places import put_texels
-from ..kernels.texture_lookup import ABSENT, FIRST_TILE
+from ..kernels.texture_lookup import FIRST_TILE
 from .channels import Numbers
 from .layer import Layer
 from .mip import used_channels
@@ -28,6 +29,7 @@ BLEND_MODES = MODES
 Masks = Float32[np.ndarray, "n 4"]
 
 ENTRIES_PER_PIECE = 128  # of texels for two or three arrays that stay in the cache
+FEWEST_FOR_THREADS = 48  # below, starting them costs more than it saves
 WHOLE = np.ones((1, 4), np.float32)
 
 
@@ -49,29 +51,31 @@ def compose(
 
     Coarser levels are not brought up to date: see `mip.update_mips`.
     """
-    views = [_view(layer) for layer in layers]
-    tiles = np.ones(len(entries), bool)
-    for view in views:
-        tiles &= view[entries] <= FIRST_TILE
+    own = np.empty((len(layers), len(entries)), np.int32)
+    for layer, row in zip(layers, own, strict=True):
+        known_slots(texture.octree.tables, layer.slots, entries, row)
+    tiles = (own <= FIRST_TILE).all(axis=0)
     if tiles.any():
-        _compose_tiles(texture, layers, views, entries[tiles], target)
-    bricks = entries[~tiles]
-    if len(bricks):
-        _compose_bricks(texture, layers, views, bricks, target)
+        _compose_tiles(texture, layers, own[:, tiles], entries[tiles], target)
+    if not tiles.all():
+        _compose_bricks(texture, layers, own[:, ~tiles], entries[~tiles], target)
 
 
-def _view(layer: Layer) -> np.ndarray:
-    """The layer's slots; if it is one tile everywhere, that tile for entries not stored, too."""
-    stored = layer.slots[layer.slots != ABSENT]
-    if stored[0] <= FIRST_TILE and (stored == stored[0]).all():
-        return np.full_like(layer.slots, stored[0])
-    return layer.slots
+def shown_texels(texture: VolumeTexture, slots, entries: Entries, name: str):
+    """What a layer of these slots shows in a channel at the texels of entries, (t, 4), and where in
+    it each entry's begin."""
+    tables = texture.octree.tables
+    first = np.concatenate([[0], np.cumsum(np.diff(tables.texel_first)[entries])])
+    own, out = np.empty(len(entries), np.int32), np.empty((first[-1], 4), np.float32)
+    known_slots(tables, slots, entries, own)
+    pool, tiles = texture.pool.use(name), texture.tiles.arrays[name]
+    layer_values(tables, slots, own, pool, tiles, texture.channels[name].kind, entries, first, out)
+    return out, first
 
 
-def _compose_tiles(texture, layers, views, entries: Entries, target: Layer) -> None:
-    """Where every layer is a tile, the picture is one."""
-    codes = np.stack([view[entries] for view in views], axis=1)
-    kinds, which = np.unique(codes, axis=0, return_inverse=True)
+def _compose_tiles(texture, layers, codes, entries: Entries, target: Layer) -> None:
+    """Where every layer shows a tile, the picture is one."""
+    kinds, which = np.unique(codes.T, axis=0, return_inverse=True)
     tiles, names = texture.tiles, used_channels(texture)
     values = {
         name: [texture.channels[name].decoded(tiles.arrays[name][FIRST_TILE - column])
@@ -90,19 +94,23 @@ def _compose_tiles(texture, layers, views, entries: Entries, target: Layer) -> N
     target.slots[entries] = np.array(made, np.int32)[which.ravel()]
 
 
-def _compose_bricks(texture, layers, views, entries: Entries, target: Layer) -> None:
+def _compose_bricks(texture, layers, own, entries: Entries, target: Layer) -> None:
     """Texel by texel, piece by piece."""
     slots = texture.writable(target, entries)
     names = used_channels(texture)
     pools = {name: texture.pool.use(name) for name in names}
     tables = texture.octree.tables
     n_texels = np.diff(tables.texel_first)
-    ranges = even_ranges(len(entries), -(-len(entries) // ENTRIES_PER_PIECE))
+    n_pieces = max(-(-len(entries) // ENTRIES_PER_PIECE), len(entries) >= FEWEST_FOR_THREADS and 2)
+    ranges = even_ranges(len(entries), n_pieces)
 
-    def shown(name: str, view: np.ndarray, part: Entries, first: np.ndarray) -> Numbers:
+    def shown(name: str, number: int, begin: int, end: int, first: np.ndarray) -> Numbers:
         out = np.empty((first[-1], 4), np.float32)
         tiles, kind = texture.tiles.arrays[name], texture.channels[name].kind
-        layer_values(tables, view, pools[name], tiles, kind, part, first, out)
+        layer_values(
+            tables, layers[number].slots, own[number, begin:end], pools[name], tiles, kind,
+            entries[begin:end], first, out,
+        )  # fmt: skip
         return out
 
     def work(piece: int) -> None:
@@ -111,10 +119,10 @@ def _compose_bricks(texture, layers, views, entries: Entries, target: Layer) -> 
         first = np.concatenate([[0], np.cumsum(n_texels[part])])
         masks = [WHOLE] * len(layers)
         if "mask" in names:
-            masks = [shown("mask", view, part, first) for view in views]
+            masks = [shown("mask", i, begin, end, first) for i in range(len(layers))]
         for name in names:
             if name != "mask":
-                values = (shown(name, view, part, first) for view in views)
+                values = (shown(name, i, begin, end, first) for i in range(len(layers)))
                 whole = _laid(layers, name, values, masks, int(first[-1]))
                 kind = texture.channels[name].kind
                 put_texels(

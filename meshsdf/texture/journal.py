@@ -8,37 +8,31 @@ operations are the document, texels are what they make.
 import os
 import sqlite3
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from ..arrays import Number
 from ..errors import TextureError
 from ..mesh import Mesh
 from ..progress import Progress, silent
 from .blobs import Damaged
-from .change import recording
+from .change import Change, recording
 from .checkpoint import write_checkpoint
-from .content import Content
+from .content import Content, digest
 from .history import BUDGET, History, Step
 from .journal_log import (
-    INSERT,
     KERNEL_VERSION,
     Entry,
+    commit,
     op_row,
-    read_log,
     steps_of,
 )
-from .journal_schema import (
-    FAULTS,
-    check_header,
-    connect,
-    header_damage,
-    integrity,
-    lost_commits,
-)
+from .journal_open import open_sound
+from .journal_schema import FAULTS, Statement, check_header, connect, copy_to
 from .operations import TURNS, Operation, perform
+from .pending import PendingTable
 from .project_lock import ProjectLock
-from .project_parts import read_parts, write_new
+from .project_parts import write_new
 from .replay import Replay
 from .salvage import salvage
 from .volume_texture import VolumeTexture
@@ -67,16 +61,22 @@ class Project:
         Number of the last operation; they are counted from 1.
     warn : callable
         Called with a sentence for whatever is not as it should be.
+    seqs : dict
+        Numbers of operations by ``(client, cseq)``, as `apply` was given them.
+    pending : PendingTable
+        Strokes that are no operations yet.
+    painting : LiveStrokes or None
+        Who paints these.
     """
 
     def __init__(
         self,
         path: Path,
         connection: sqlite3.Connection,
-        lock: ProjectLock,
         texture: VolumeTexture,
+        origin: int = 0,
         *,
-        origin: int,
+        lock: ProjectLock,
         warn: Warn,
         budget: int,
     ) -> None:
@@ -91,10 +91,12 @@ class Project:
         self._lock = lock
         self._origin = origin
         self._content, self._digests = Content(texture), Content(texture)
-        self._seqs: dict[tuple[str, int], int] = {}
+        self.seqs: dict[tuple[str, int], int] = {}
         self._checkpoint_seq = -1
         self._dirty_bytes = 0
         self._is_open = True
+        self.painting: Any = None
+        self.pending = PendingTable(connection, lock)
 
     @classmethod
     def create(
@@ -143,7 +145,7 @@ class Project:
         except BaseException:
             lock.release()
             raise
-        return cls(path, connection, lock, texture, origin=0, warn=warn, budget=budget)
+        return cls(path, connection, texture, lock=lock, warn=warn, budget=budget)
 
     @classmethod
     def open(
@@ -152,11 +154,20 @@ class Project:
         *,
         budget: int = BUDGET,
         warn: Warn = unheard,
+        finish_strokes: bool = True,
     ) -> "Project":
         """Open a project in the state after its last operation that can be read.
 
         Of a damaged file all that is sound goes into a new one in its place; the damaged one stays
         beside it. What that is and what is lost is said through ``warn``.
+
+        Parameters
+        ----------
+        path, budget, warn
+            As `create` takes them.
+        finish_strokes : bool
+            Make operations of the strokes that were being painted when the last owner died; else
+            they wait until `LiveStrokes` goes on with them.
 
         Raises
         ------
@@ -167,13 +178,19 @@ class Project:
         path = Path(path)
         check_header(path)
         lock = ProjectLock(path)
+
+        def restored(entries: list[Entry], *args: Any) -> "Project":
+            project = cls(path, *args, lock=lock, warn=warn, budget=budget)
+            project._restore(entries)
+            return project
+
         try:
             try:
-                project = cls._opened(path, lock, budget, warn)
+                project = open_sound(path, lock, warn, restored)
             except (Damaged, *FAULTS) as error:
                 warn(f"{path} is damaged: {error}")
                 salvage(path, warn)
-                project = cls._opened(path, lock, budget, warn)
+                project = open_sound(path, lock, warn, restored)
         except (Damaged, *FAULTS) as error:
             lock.release(keep=True)
             what = f"nothing of the project can be read: {error}"
@@ -181,35 +198,11 @@ class Project:
         except BaseException:
             lock.release(keep=True)
             raise
-        lock.write(project.last_seq)
-        return project
+        lock.note(project.last_seq, project.pending.n_rows)
+        if finish_strokes and project.pending.n_rows:
+            from .live import finish_pending  # which imports this module
 
-    @classmethod
-    def _opened(cls, path: Path, lock: ProjectLock, budget: int, warn: Warn) -> "Project":
-        """The project of a file in which nothing but checkpoints may be damaged."""
-        if found := header_damage(path):
-            raise Damaged(found)
-        n_lost = lost_commits(path)
-        connection = connect(path)
-        helper = ThreadPoolExecutor(1)
-        try:
-            verdict = helper.submit(integrity, path)
-            texture, origin, sound = read_parts(connection, warn)
-            if not sound:
-                raise Damaged("mesh or octree are not as they were written")
-            project = cls(path, connection, lock, texture, origin=origin, warn=warn, budget=budget)
-            entries, wrong = read_log(connection, origin)
-            if wrong:
-                raise Damaged(wrong)
-            project._restore(entries)
-            if verdict.result() != "ok":
-                raise Damaged(verdict.result())
-            project._say_what_is_missing(n_lost)
-        except BaseException:
-            helper.shutdown()
-            connection.close()
-            raise
-        helper.shutdown()
+            finish_pending(project)
         return project
 
     def __enter__(self) -> "Project":
@@ -235,8 +228,15 @@ class Project:
             It cannot be done, or not be kept; then nothing has changed.
         """
         self._require_open()
-        if cseq is not None and (client, cseq) in self._seqs:
-            return self._seqs[client, cseq]
+        if cseq is not None and (client, cseq) in self.seqs:
+            return self.seqs[client, cseq]
+        if self._is_painting:
+            what = "strokes are being painted"
+            raise TextureError(what, "Project.apply", "go through LiveStrokes.apply")
+        return self.apply_under(operation, client=client, cseq=cseq)
+
+    def apply_under(self, operation: Operation, *, client: str, cseq: int | None) -> int:
+        """As `apply`, by whoever sees to the strokes that are being painted."""
         operation = Operation.decoded(operation.kind, operation.encoded())
         seq = self.last_seq + 1
         if operation.kind in TURNS:
@@ -246,15 +246,27 @@ class Project:
                 perform(self.texture, operation)
             row = op_row(seq, client, cseq, operation, not change.is_empty)
             self._commit(row, lambda: change.undo(self.texture))
-            self._dirty_bytes += change.n_bytes(self.texture)
-            if not change.is_empty:
-                self.history.push(operation.kind, seq, change)
-        self.last_seq = seq
-        if cseq is not None:
-            self._seqs[client, cseq] = seq
-        self._lock.write(seq)
+            self._push(operation, seq, change)
+        self._done(seq, client, cseq)
         if operation.kind not in TURNS:  # undo and redo do not wait for a checkpoint
-            self._checkpoint_if_due()
+            self.checkpoint_if_due()
+        return seq
+
+    def adopt(self, operation: Operation, change: Change, *, client: str, cseq: int) -> int:
+        """Keep an operation that is done already, in the place of its client's pending rows.
+
+        Raises
+        ------
+        TextureError
+            It cannot be kept; then it is taken back.
+        """
+        self._require_open()
+        seq = self.last_seq + 1
+        row = op_row(seq, client, cseq, operation, not change.is_empty)
+        self._commit(row, lambda: change.undo(self.texture), self.pending.forget(client))
+        self._push(operation, seq, change)
+        self.pending.forgotten(client)
+        self._done(seq, client, cseq)
         return seq
 
     def undo(self) -> int:
@@ -268,7 +280,7 @@ class Project:
     def checkpoint(self) -> None:
         """Keep what the layers hold now, so that opening need not perform operations again."""
         self._require_open()
-        if self._checkpoint_seq == self.last_seq:
+        if self._checkpoint_seq == self.last_seq or self._is_painting:
             return
         history = self.history
         tip = history.steps[history.n_done - 1].number if history.n_done else 0
@@ -277,6 +289,8 @@ class Project:
 
     def digest(self) -> str:
         """SHA-256 of all that the layers hold, wherever in memory it is."""
+        if self._is_painting:
+            return digest(self.texture)
         for _ in self._digests.update():
             pass
         return self._digests.digest()
@@ -290,23 +304,14 @@ class Project:
             There is such a file, or it cannot be written.
         """
         self._require_open()
-        path = Path(path)
-        if path.exists():
-            raise TextureError("there is such a file already", str(path), "choose another name")
-        beside = path.with_name(f".{path.name}.new")
-        beside.unlink(missing_ok=True)
-        try:
-            self._connection.execute("VACUUM INTO ?", (str(beside),))
-            os.replace(beside, path)
-        except (sqlite3.Error, OSError) as error:
-            beside.unlink(missing_ok=True)
-            what = f"the copy cannot be written: {error}"
-            raise TextureError(what, str(path), "check the folder and its free space") from None
+        copy_to(self._connection, Path(path))
 
     def close(self) -> None:
         """Write a checkpoint and let others open the project; closing twice does no harm."""
         if not self._is_open:
             return
+        if self.painting is not None:
+            self.painting.set_aside()
         try:
             self.checkpoint()
             self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
@@ -325,28 +330,38 @@ class Project:
         turned = history.n_done - (operation.kind == "redo")
         self._dirty_bytes += history.steps[turned].n_bytes
 
-    def _commit(self, row: tuple, take_back: Callable[[], object]) -> None:
-        """Write an operation's row; if that fails, its effect is taken back."""
-        try:
-            self._connection.execute(INSERT, row)
-        except BaseException as error:
-            take_back()
-            if not isinstance(error, sqlite3.Error):
-                # Ctrl-C may come when all was written already
-                self._connection.execute("DELETE FROM op WHERE seq = ?", row[:1])
-                raise
-            what = f"operation {row[0]} could not be kept: {error}"
-            fix = "free some space, or save the project elsewhere; then do it again"
-            raise TextureError(what, str(self.path), fix) from None
+    def _commit(self, row: tuple, take_back: Callable[[], object], *more: Statement) -> None:
+        commit(self._connection, self.path, row, take_back, *more)
 
-    def _checkpoint_if_due(self) -> None:
+    def _push(self, operation: Operation, seq: int, change: Change) -> None:
+        self._dirty_bytes += change.n_bytes(self.texture)
+        if not change.is_empty:
+            self.history.push(operation.kind, seq, change)
+
+    def _done(self, seq: int, client: str, cseq: int | None) -> None:
+        self.last_seq = seq
+        if cseq is not None:
+            self.seqs[client, cseq] = seq
+        self._lock.note(seq, self.pending.n_rows)
+
+    @property
+    def _is_painting(self) -> bool:
+        return self.painting is not None and self.painting.is_painting
+
+    @property
+    def checkpoint_is_due(self) -> bool:
+        """Whether much came since the last checkpoint."""
         n_operations = self.last_seq - max(self._checkpoint_seq, self._origin)
-        if n_operations < OPERATIONS_PER_CHECKPOINT and self._dirty_bytes < BYTES_PER_CHECKPOINT:
-            return
-        try:
-            self.checkpoint()
-        except sqlite3.Error as error:
-            self.warn(f"no checkpoint could be written to {self.path}: {error}")
+        many = n_operations >= OPERATIONS_PER_CHECKPOINT
+        return many or self._dirty_bytes >= BYTES_PER_CHECKPOINT
+
+    def checkpoint_if_due(self) -> None:
+        """Write a checkpoint if one is due; ``warn`` is told if that fails."""
+        if self.checkpoint_is_due:
+            try:
+                self.checkpoint()
+            except sqlite3.Error as error:
+                self.warn(f"no checkpoint could be written to {self.path}: {error}")
 
     def _restore(self, entries: list[Entry]) -> None:
         """Bring the texture to the state after the last operation of the log."""
@@ -354,7 +369,7 @@ class Project:
         self.history.steps = [Step(step.kind, step.seq, None) for step in steps]
         self.history.n_done = n_done
         self.last_seq = entries[-1].seq if entries else self._origin
-        self._seqs = {(e.client, e.cseq): e.seq for e in entries if e.cseq is not None}
+        self.seqs = {(e.client, e.cseq): e.seq for e in entries if e.cseq is not None}
         later = {step.seq for step in steps if step.kernel_version != KERNEL_VERSION}
         loaded = self._replay.load(n_done)
         if loaded is not None:
@@ -371,17 +386,6 @@ class Project:
                 f"operations of {self.path} were first done by another version of meshsdf; "
                 "done again, their texels may differ by rounding"
             )
-
-    def _say_what_is_missing(self, n_lost: int) -> None:
-        """Compare with what was acknowledged before the last owner died."""
-        left = self._lock.left_seq
-        if left > self.last_seq:
-            self.warn(
-                f"operations {self.last_seq + 1} to {left} of {self.path} were acknowledged and "
-                "are missing from the file"
-            )
-        elif n_lost > 1 or (n_lost and not left):
-            self.warn(f"{n_lost} damaged commits in the log of {self.path} were passed over")
 
     def _require_open(self) -> None:
         if not self._is_open:

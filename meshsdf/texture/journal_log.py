@@ -3,13 +3,16 @@
 import sqlite3
 import time
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
+from ..errors import TextureError
 from .blobs import Damaged
-from .journal_schema import FAULTS
+from .journal_schema import FAULTS, Statement, in_one
 from .operations import TURNS, Operation
 
-KERNEL_VERSION = 1
+KERNEL_VERSION = 2
 """Raised whenever an operation leaves other texels than it did before."""
 
 COLUMNS = "seq, client, cseq, kind, layer, params, changed, kernel_version, t, crc32"
@@ -81,6 +84,33 @@ def steps_of(entries: list[Entry]) -> tuple[list[Entry], int]:
             steps[n_done:] = [entry]
             n_done += 1
     return steps, n_done
+
+
+def commit(
+    connection: sqlite3.Connection,
+    path: Path,
+    row: tuple,
+    take_back: Callable[[], object],
+    *more: Statement,
+) -> None:
+    """Write an operation's row, and in one go what more there is to write.
+
+    Raises
+    ------
+    TextureError
+        That failed, and its effect was taken back.
+    """
+    try:
+        in_one(connection, (INSERT, row), *more)
+    except BaseException as error:
+        take_back()
+        if not isinstance(error, sqlite3.Error):
+            # Ctrl-C may come when all was written already
+            connection.execute("DELETE FROM op WHERE seq = ?", row[:1])
+            raise
+        what = f"operation {row[0]} could not be kept: {error}"
+        fix = "free some space, or save the project elsewhere; then do it again"
+        raise TextureError(what, str(path), fix) from None
 
 
 def _checksum(row: tuple) -> int:

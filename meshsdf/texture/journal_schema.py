@@ -1,9 +1,11 @@
 """The tables of a project's file, and what its first bytes tell.
 
 A project is one SQLite database. Operations are appended and never removed; checkpoints keep what
-the layers held after some of them.
+the layers held after some of them. Strokes that are no operations yet have a table of their own,
+which files of format version 1 lack and get when they are opened.
 """
 
+import os
 import sqlite3
 import struct
 from pathlib import Path
@@ -14,7 +16,10 @@ from ..errors import TextureError
 from ..kernels.log_checksum import log_checksum
 
 APPLICATION_ID = 0x4D544558  # "MTEX"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+Statement = tuple[str, tuple]
+"""SQL, and its values."""
+
 MAGIC = b"SQLite format 3\0"
 FAULTS = (sqlite3.Error, UnicodeDecodeError)  # what reading a damaged database raises
 HEADER = 100  # bytes of a database's header
@@ -44,6 +49,11 @@ CREATE TABLE brick(
     codec INTEGER NOT NULL, crc32 INTEGER NOT NULL, data BLOB NOT NULL,
     PRIMARY KEY (layer, channel, chunk, seq));
 """
+PENDING = """
+CREATE TABLE pending(
+    id INTEGER PRIMARY KEY, client TEXT NOT NULL, cseq INTEGER NOT NULL, kind TEXT NOT NULL,
+    data BLOB NOT NULL, t REAL NOT NULL, crc32 INTEGER NOT NULL);
+"""
 
 
 def connect(path: Path) -> sqlite3.Connection:
@@ -71,8 +81,49 @@ def create(path: Path) -> sqlite3.Connection:
     connection = connect(path)
     connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
     connection.execute(f"PRAGMA user_version = {FORMAT_VERSION}")
-    connection.executescript(f"BEGIN; {SCHEMA} COMMIT;")
+    connection.executescript(f"BEGIN; {SCHEMA} {PENDING} COMMIT;")
     return connection
+
+
+def upgrade(connection: sqlite3.Connection) -> None:
+    """Give a project of an earlier format what it lacks."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if version < FORMAT_VERSION:
+        in_one(connection, (PENDING, ()), (f"PRAGMA user_version = {FORMAT_VERSION}", ()))
+
+
+def in_one(connection: sqlite3.Connection, *statements: Statement) -> None:
+    """Execute statements, all of them or, if one fails, none."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        for statement, values in statements:
+            connection.execute(statement, values)
+        connection.execute("COMMIT")
+    except BaseException:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        raise
+
+
+def copy_to(connection: sqlite3.Connection, path: Path) -> None:
+    """Write a compact copy of a database to a file that is not there yet.
+
+    Raises
+    ------
+    TextureError
+        There is such a file, or it cannot be written.
+    """
+    if path.exists():
+        raise TextureError("there is such a file already", str(path), "choose another name")
+    beside = path.with_name(f".{path.name}.new")
+    beside.unlink(missing_ok=True)
+    try:
+        connection.execute("VACUUM INTO ?", (str(beside),))
+        os.replace(beside, path)
+    except (sqlite3.Error, OSError) as error:
+        beside.unlink(missing_ok=True)
+        what = f"the copy cannot be written: {error}"
+        raise TextureError(what, str(path), "check the folder and its free space") from None
 
 
 def check_header(path: Path) -> None:

@@ -15,13 +15,13 @@ import numpy as np
 from ..errors import TextureError
 from ..kernels.parallel import even_ranges, run_pieces
 from ..kernels.texture_lookup import ABSENT
-from ..kernels.texture_mip import CHANGED, mip_texels
+from ..kernels.texture_mip import CHANGED, PARENTS, mip_texels, parents_of
 from ..progress import Progress, silent
 from .channels import Numbers
 from .layer import Layer
 from .octree import Entries
-from .refine import check_entries, family_of, level_range, refine_to, texel_mask
-from .volume_texture import VolumeTexture, first_texel
+from .refine import check_entries, level_range, refine_to, texel_mask
+from .volume_texture import VolumeTexture
 
 ENTRIES_PER_PIECE = 256
 ENTRIES_AT_ONCE = 8192
@@ -50,17 +50,34 @@ def update_mips(texture: VolumeTexture, layer: Layer, entries: Entries) -> Entri
     become tiles.
     """
     check_entries(texture, entries, "update_mips(entries=...)")
-    levels = texture.octree.tables.levels
-    changed, all_changed = entries[:0], [np.empty(0, np.int32)]
-    for level in range(texture.octree.n_levels - 1):
-        below = np.union1d(changed, entries[levels[entries] == level]).astype(np.int32)
-        changed = below[:0]
-        if len(below):
-            above = np.unique(family_of(texture, below))
-            above = above[(above >= 0)]
-            changed = _updated(texture, layer, above[layer.slots[above] != ABSENT])
-            all_changed.append(changed)
+    return _remade(texture, layer, np.unique(entries), entries[:0])
+
+
+def remake_means(texture: VolumeTexture, layer: Layer, entries: Entries) -> Entries:
+    """As `update_mips`, for entries in rising order whose own texels may be means, too."""
+    return _remade(texture, layer, entries, entries)
+
+
+def _remade(texture: VolumeTexture, layer: Layer, entries: Entries, due: Entries) -> Entries:
+    """Make the entries that are due, and those above written ones, of the level below each."""
+    octree = texture.octree
+    below, all_changed = entries[:0], [np.empty(0, np.int32)]
+    for level in range(octree.n_levels - 1):
+        first, last, end = octree.level_first[level : level + 3]
+        below = np.union1d(below, entries[slice(*np.searchsorted(entries, (first, last)))])
+        own = due[slice(*np.searchsorted(due, (last, end)))]
+        if len(below) or len(own):
+            above = np.union1d(parents(texture, below.astype(np.int32)), own).astype(np.int32)
+            below = _updated(texture, layer, above[layer.slots[above] != ABSENT])
+            all_changed.append(below)
     return np.concatenate(all_changed)
+
+
+def parents(texture: VolumeTexture, entries: Entries) -> Entries:
+    """The entries one level up that hold means of texels of others, not sorted, some repeatedly."""
+    found = np.empty((len(entries), PARENTS), np.int32)
+    parents_of(texture.octree.tables, entries, found)
+    return found[found >= 0]
 
 
 def bake(
@@ -97,14 +114,27 @@ def bake(
     texture.pool.drop(layer.slots[:first])
     layer.slots[:first] = ABSENT
     entries = np.arange(first, last, dtype=np.int32)
+    evaluate(texture, layer, entries, function, channel, progress)
+    update_mips(texture, layer, entries)
+
+
+def evaluate(
+    texture: VolumeTexture,
+    layer: Layer,
+    entries: Entries,
+    function: Callable[..., Any],
+    channel: str = "base",
+    progress: Progress = silent,
+) -> None:
+    """Put what a function says of them into stored entries of one level; no means are made."""
     for begin in range(0, len(entries), ENTRIES_PER_CALL):
         part = entries[begin : begin + ENTRIES_PER_CALL]
         points, normals = texture.places(part)
-        values = evaluated(function, points, normals, texture.octree.spacing(level))
+        spacing = texture.octree.spacing(int(texture.octree.tables.levels[part[0]]))
+        values = evaluated(function, points, normals, spacing)
         texture.put(layer, part, values, channel=channel)
         texture.collapse_uniform(layer, part)
         progress("bake", min(1.0, (begin + ENTRIES_PER_CALL) / len(entries)))
-    update_mips(texture, layer, entries)
 
 
 def evaluated(function: Callable[..., Any], points, normals, spacing: float) -> Numbers:
@@ -176,7 +206,7 @@ def _store(texture, layer, entries, texels: dict[str, np.ndarray]) -> None:
     """Texels into entries: into bricks, or as tiles where they are all one number."""
     exists = texel_mask(texture, entries)
     uniform = np.ones(len(entries), bool)
-    first = np.array([first_texel(mask) for mask in texture.octree.tables.masks[entries]])
+    first = exists.argmax(axis=1)
     rows = np.arange(len(entries))
     for array in texels.values():
         uniform &= ((array == array[rows, first][:, None]) | ~exists).all(axis=1)

@@ -7,11 +7,13 @@ import numpy as np
 from ..arrays import Number
 from ..errors import TextureError
 from ..kernels.texture_lookup import ABSENT
+from ..sdf.mesh_distance import MeshDistance
 from .ball import paint_ball_on
+from .detail import Level, bake_level
 from .layer import Layer
-from .mip import bake as bake_function
-from .procedural import procedural
+from .procedural import procedural, sees_shape
 from .refine import coarsen
+from .sdf_patterns import SignedDistance
 from .volume_texture import Color, VolumeTexture
 
 
@@ -84,9 +86,11 @@ def fill_color(texture: VolumeTexture, *, layer: int, color: Color) -> None:
 
 
 def bake(
-    texture: VolumeTexture, *, layer: int, texture_kind: str, level: int = 0, **parameters: Any
+    texture: VolumeTexture, *, layer: int, texture_kind: str, level: Level = 0, **parameters: Any
 ) -> None:
-    """Make a layer's colour a procedural texture, see `mip.bake`.
+    """Make a layer's colour a procedural texture, see `detail.bake_level`.
+
+    Kinds that see the shape they are on are asked of the texture's surface.
 
     Raises
     ------
@@ -94,8 +98,24 @@ def bake(
         There is no such layer, level or texture, or it has other parameters.
     """
     found = layer_numbered(texture, layer)
-    solid = procedural(texture_kind, **parameters)
-    bake_function(texture, found, solid, level=level)
+    distance = surface_distance(texture) if sees_shape(texture_kind) else None
+    solid = procedural(texture_kind, signed_distance=distance, **parameters)
+    bake_level(texture, found, solid, level=level)
+
+
+def surface_distance(texture: VolumeTexture) -> SignedDistance:
+    """The signed distance of the surface that a texture was made around.
+
+    Raises
+    ------
+    TextureError
+        The texture knows of no surface.
+    """
+    if texture.surface is None:
+        what = "the texture does not know its surface"
+        raise TextureError(what, "operation 'bake'", "set texture.surface to the mesh")
+    distances = MeshDistance(texture.surface)
+    return lambda points: distances(points).distance
 
 
 def paint_ball(

@@ -10,6 +10,13 @@ from ..arrays import Number
 from ..errors import TextureError
 from .colors import linear_color
 
+RANGES: dict[str, tuple[Number, Number]] = {
+    "share": (0.0, 1.0),
+    "count": (1, 32),
+    "seed": (0, 2**31 - 1),
+}
+"""Least and most of the kinds of values that have them."""
+
 Triple = Sequence[Number] | np.ndarray
 
 
@@ -44,7 +51,7 @@ def from_text(name: str, one: Field, text: str) -> Any:
     try:
         if values in ("point", "direction") or (values == "color" and "," in text):
             value = [float(part) for part in text.split(",")]
-        elif values in ("length", "number", "share", "count", "seed"):
+        elif values in ("length", "ratio", "number", "share", "count", "seed"):
             value = float(text)
         elif values == "switch":
             value = {"true": True, "yes": True, "false": False, "no": False}.get(text, text)
@@ -66,15 +73,19 @@ def _length(value: Any, _: str) -> float:
     return _number(value, np.nextafter(0.0, 1.0), np.inf, words)
 
 
+def _ratio(value: Any, _: str) -> float:
+    return _number(value, np.nextafter(0.0, 1.0), np.inf, "a number above 0")
+
+
 def _any_number(value: Any, _: str) -> float:
     return _number(value, -np.inf, np.inf, "a number")
 
 
 def _share(value: Any, _: str) -> float:
-    return _number(value, 0.0, 1.0, "a number from 0 to 1")
+    return _number(value, *RANGES["share"], "a number from 0 to 1")
 
 
-def _whole(value: Any, least: int, most: int, words: str) -> int:
+def _whole(value: Any, least: Number, most: Number, words: str) -> int:
     number = _number(value, least, most, words)
     if number != int(number):
         raise ValueError(words)
@@ -82,11 +93,11 @@ def _whole(value: Any, least: int, most: int, words: str) -> int:
 
 
 def _count(value: Any, _: str) -> int:
-    return _whole(value, 1, 32, "a whole number from 1 to 32")
+    return _whole(value, *RANGES["count"], "a whole number from 1 to 32")
 
 
 def _seed(value: Any, _: str) -> int:
-    return _whole(value, 0, 2**31 - 1, "a whole number from 0 to 2147483647")
+    return _whole(value, *RANGES["seed"], "a whole number from 0 to 2147483647")
 
 
 def _point(value: Any, _: str) -> tuple[float, float, float]:
@@ -129,6 +140,7 @@ def _choice(value: Any, values: str) -> str:
 
 CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "length": _length,
+    "ratio": _ratio,
     "number": _any_number,
     "share": _share,
     "count": _count,

@@ -105,8 +105,7 @@ class BrickPool:
         """
         dropped = slots[slots >= 0]
         np.subtract.at(self.holders, dropped, np.int32(1))
-        unique = np.unique(dropped)
-        unneeded = unique[self.holders[unique] == 0][::-1]
+        unneeded = np.unique(dropped[self.holders[dropped] == 0])[::-1]
         known = self._is_known(unneeded)
         free = unneeded[~known].tolist()
         self._waiting.update(unneeded[known].tolist())

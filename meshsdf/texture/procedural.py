@@ -1,14 +1,16 @@
 """The procedural textures by name, for command lines and files."""
 
 import difflib
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields
 from typing import Any
 
+from ..arrays import Number
 from ..errors import TextureError
 from .cellular import Cellular, Spots
 from .clouds import Clouds
 from .parameters import from_text
 from .patterns import Brick, Checker, Stripes
+from .sdf_patterns import ON_SHAPE, SignedDistance
 from .solid import Solid
 from .stone import Agate, Granite, Marble
 from .wood import Wood, WoodGrain
@@ -26,7 +28,7 @@ PROCEDURALS: dict[str, type[Solid]] = {
     "wood": Wood,
     "wood_grain": WoodGrain,
 }
-"""Every kind that needs nothing but points; those that need a shape are in `sdf_patterns`."""
+"""Every kind that needs nothing but points; those that need a shape are `sdf_patterns.ON_SHAPE`."""
 
 
 @dataclass(frozen=True)
@@ -38,16 +40,25 @@ class Parameter:
     meaning: str
 
 
-def procedural(kind: str, **parameters: Any) -> Solid:
+def procedural(
+    kind: str, *, signed_distance: SignedDistance | None = None, **parameters: Any
+) -> Any:
     """Return the texture of a kind, its parameters checked.
 
-    Values may be text, as a command line has them: ``"0.1"``, ``"0,0,1"``, ``"#aa7744"``.
+    Parameters
+    ----------
+    kind : str
+        One of `PROCEDURALS`, or of `sdf_patterns.ON_SHAPE`; ``-`` is as good as ``_``.
+    signed_distance : callable, optional
+        Of the shape; kinds that see the shape they are on need it.
+    **parameters
+        Values may be text, as a command line has them: ``"0.1"``, ``"0,0,1"``, ``"#aa7744"``.
 
     Raises
     ------
     TextureError
         There is no such kind or parameter, or the value is none of its kind; the error says which
-        are valid.
+        are valid. Or the distance is missing.
 
     Examples
     --------
@@ -55,7 +66,7 @@ def procedural(kind: str, **parameters: Any) -> Solid:
     (0.0, 0.0, 1.0)
     """
     type_ = _type_of(kind)
-    known = {one.name: one for one in fields(type_)}
+    known = {one.name: one for one in _fields(type_)}
     for name in parameters:
         if name not in known:
             close = difflib.get_close_matches(name, known, 1)
@@ -69,7 +80,34 @@ def procedural(kind: str, **parameters: Any) -> Solid:
         name: from_text(type_.__name__, known[name], value) if isinstance(value, str) else value
         for name, value in parameters.items()
     }
-    return type_(**values)
+    if not sees_shape(kind):
+        return type_(**values)
+    if signed_distance is None:
+        what = f"{kind} looks at the shape that it is on"
+        raise TextureError(what, f'procedural("{kind}")', "pass signed_distance=...")
+    return type_(distance=signed_distance, **values)
+
+
+def sees_shape(kind: str) -> bool:
+    """Whether a kind needs the signed distance of a shape."""
+    return kind.replace("-", "_") in ON_SHAPE
+
+
+def lengths_for(kind: str, longest: Number) -> dict[str, float]:
+    """What lengths of a kind to begin with on a mesh whose longest side is given, world units.
+
+    Defaults are for a mesh of size 1; a solid texture has one length, its scale.
+
+    Examples
+    --------
+    >>> lengths_for("wood", 40.0), lengths_for("edge-wear", 40.0)
+    ({'scale': 40.0}, {'reach': 0.8})
+    """
+    unit = float(longest) or 1.0
+    if not sees_shape(kind):
+        return {"scale": unit}
+    lengths = [one for one in _fields(_type_of(kind)) if one.metadata["values"] == "length"]
+    return {one.name: unit * one.default for one in lengths}
 
 
 def parameters_of(kind: str) -> list[Parameter]:
@@ -81,15 +119,21 @@ def parameters_of(kind: str) -> list[Parameter]:
     Parameter(name='side', default=0.25, meaning='of a cube')
     """
     return [
-        Parameter(one.name, one.default, one.metadata["meaning"]) for one in fields(_type_of(kind))
+        Parameter(one.name, one.default, one.metadata["meaning"]) for one in _fields(_type_of(kind))
     ]
 
 
-def _type_of(kind: str) -> type[Solid]:
-    if kind not in PROCEDURALS:
+def _fields(type_: type) -> list[Field]:
+    """The parameters of a class; a shape is none of them."""
+    return [one for one in fields(type_) if one.metadata]
+
+
+def _type_of(kind: str) -> type:
+    known = PROCEDURALS | ON_SHAPE
+    if kind.replace("-", "_") not in known:
         raise TextureError(
             f"there is no texture {kind!r}",
             "procedural(kind)",
-            f"pass one of {', '.join(PROCEDURALS)}",
+            f"pass one of {', '.join(known)}",
         )
-    return PROCEDURALS[kind]
+    return known[kind.replace("-", "_")]

@@ -26,6 +26,10 @@ class ProjectLock:
     ----------
     left_seq : int
         The last operation that an owner who died had acknowledged; 0 if there was none.
+    left_pending : int
+        How many batches of unfinished strokes it had acknowledged besides.
+    seq, n_pending : int
+        What was noted last.
 
     Raises
     ------
@@ -38,20 +42,21 @@ class ProjectLock:
         while True:
             self._file = self._opened(project)
             if not _try_lock(self._file):
-                pid, _ = self._record()
+                pid, *_ = self._record()
                 os.close(self._file)
                 what = f"the project is open in process {pid}"
                 raise TextureError(what, str(project), "close it there, or open a copy")
             if self._is_in_place():
                 break
             os.close(self._file)  # its owner removed it in the meantime
-        _, self.left_seq = self._record()
-        self.write(self.left_seq)
+        _, self.left_seq, self.left_pending = self._record()
+        self.note(self.left_seq, self.left_pending)
 
-    def write(self, seq: int) -> None:
-        """Note which operation was acknowledged last."""
+    def note(self, seq: int, n_pending: int) -> None:
+        """Note which operation was acknowledged last, and how many batches are no operations."""
+        self.seq, self.n_pending = seq, n_pending
         os.lseek(self._file, 0, os.SEEK_SET)
-        os.write(self._file, f"{os.getpid()} {seq}\n".encode().ljust(RECORD))
+        os.write(self._file, f"{os.getpid()} {seq} {n_pending}\n".encode().ljust(RECORD))
 
     def release(self, *, keep: bool = False) -> None:
         """Let others open the project; ``keep`` leaves the note."""
@@ -67,11 +72,13 @@ class ProjectLock:
             fix = "make its folder writable, or copy the project elsewhere"
             raise TextureError(what, str(project), fix) from None
 
-    def _record(self) -> tuple[int, int]:
+    def _record(self) -> tuple[int, int, int]:
         os.lseek(self._file, 0, os.SEEK_SET)
         words = os.read(self._file, RECORD).split()
-        numbers = [int(word) for word in words[:2] if word.isdigit()]
-        return (numbers[0], numbers[1]) if len(numbers) == 2 else (0, 0)
+        numbers = [int(word) for word in words[:3] if word.isdigit()]
+        if len(numbers) != len(words[:3]) or len(numbers) < 2:
+            return 0, 0, 0
+        return numbers[0], numbers[1], numbers[2] if len(numbers) > 2 else 0
 
     def _is_in_place(self) -> bool:
         try:

@@ -53,7 +53,7 @@ def refine(texture: VolumeTexture, layer: Layer, entries: Entries) -> Entries:
     Cost: O(n) in time and memory; nothing is evaluated where all around is of one colour.
     """
     check_entries(texture, entries, "refine(entries=...)")
-    new = _closure(texture, layer, entries)
+    new = with_balance(texture, layer, entries)
     by_level = _split(texture, new)
     # Coarse first: a tile whose parents are one tile shows what they do
     for level in reversed(range(texture.octree.n_levels - 1)):
@@ -174,15 +174,18 @@ def family_of(texture: VolumeTexture, entries: Entries) -> Family:
     return family
 
 
-def seen_above(texture: VolumeTexture, layer: Layer, entries: Entries, name: str) -> Numbers:
-    """What a channel shows at the texels of entries of one level by the levels above it."""
+def seen_above(
+    texture: VolumeTexture, layer: Layer, entries: Entries, name: str, level: int | None = None
+) -> Numbers:
+    """What a channel shows at the texels of entries of one level by ``level`` and those above it,
+    or by those above their own."""
     tables = texture.octree.tables._replace(texel=1.0)  # places are then free of rounding
     n_texels = tables.texel_first[entries + 1] - tables.texel_first[entries]
     first = np.concatenate([[0], np.cumsum(n_texels)])
     points, normals = np.empty((first[-1], 3)), np.empty((first[-1], 3))
     seen = np.empty((first[-1], 4), np.float32)
     ranges = even_ranges(len(entries), -(-len(entries) // (ENTRIES_PER_PIECE // 8)))
-    width = np.array([2.0 ** (int(tables.levels[entries[0]]) + 1)])
+    width = np.array([2.0 ** (int(tables.levels[entries[0]]) + 1 if level is None else level)])
     pool, tiles = texture.pool.arrays[name], texture.tiles.arrays[name]
     kind = texture.channels[name].kind
 
@@ -198,7 +201,7 @@ def seen_above(texture: VolumeTexture, layer: Layer, entries: Entries, name: str
     return seen
 
 
-def _closure(texture: VolumeTexture, layer: Layer, entries: Entries) -> Entries:
+def with_balance(texture: VolumeTexture, layer: Layer, entries: Entries) -> Entries:
     """Entries that are to be stored, so that these are in balance; those that are not yet."""
     by_level = _split(texture, np.unique(entries[layer.slots[entries] == ABSENT]))
     for level in range(texture.octree.n_levels - 1):
@@ -239,19 +242,36 @@ def texel_mask(texture: VolumeTexture, entries: Entries) -> np.ndarray:
 def _close(texture: VolumeTexture, layer: Layer, entries: Entries, tolerance: float) -> np.ndarray:
     """(n,) bool: entries of one level whose texels are within the tolerance of the level above."""
     close = np.ones(len(entries), bool)
-    for begin in range(0, len(entries), ENTRIES_AT_ONCE):
-        part = entries[begin : begin + ENTRIES_AT_ONCE]
-        exists = texel_mask(texture, part)
-        row = np.nonzero(exists)[0]
-        for name, pool in texture.pool.arrays.items():
-            channel = texture.channels[name]
-            slots = layer.slots[part]
-            tiles = texture.tiles.arrays[name][np.maximum(FIRST_TILE - slots, 0)]
-            texels = np.where((slots >= 0)[:, None], pool[slots], tiles[:, None])[exists]
-            seen = seen_above(texture, layer, part, name)
-            apart = _difference(name, channel.decoded(texels), seen)
-            np.logical_and.at(close, begin + row, apart <= tolerance)
+    for name in texture.pool.arrays:
+        close &= unlike_above(texture, layer, entries, layer.slots[entries], name) <= tolerance
     return close
+
+
+def unlike_above(
+    texture: VolumeTexture,
+    layer: Layer,
+    entries: Entries,
+    slots: np.ndarray,
+    name: str,
+    level: int | None = None,
+) -> np.ndarray:
+    """By how much, at most, texels in slots differ from what `seen_above` says.
+
+    One number for each of the entries, which are of one level, in one channel: colours in sRGB
+    times alpha, from 0 to 1; other channels in their own units.
+    """
+    apart = np.zeros(len(entries), np.float32)
+    channel, pool = texture.channels[name], texture.pool.use(name)
+    for begin in range(0, len(entries), ENTRIES_AT_ONCE):
+        part, own = entries[begin : begin + ENTRIES_AT_ONCE], slots[begin : begin + ENTRIES_AT_ONCE]
+        exists = texel_mask(texture, part)
+        tiles = texture.tiles.arrays[name][np.maximum(FIRST_TILE - own, 0)]
+        texels = np.where((own >= 0)[:, None], pool[own], tiles[:, None])[exists]
+        seen = seen_above(texture, layer, part, name, level)
+        difference = _difference(name, channel.decoded(texels), seen)
+        first = np.concatenate([[0], np.cumsum(exists.sum(axis=1))])[:-1]
+        apart[begin : begin + ENTRIES_AT_ONCE] = np.maximum.reduceat(difference, first)
+    return apart
 
 
 def _difference(name: str, a: Numbers, b: Numbers) -> np.ndarray:

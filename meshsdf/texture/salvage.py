@@ -13,6 +13,8 @@ from .checkpoint import install, load_checkpoint, write_checkpoint
 from .content import Content
 from .journal_log import COLUMNS, Entry, read_row, steps_of
 from .journal_schema import FAULTS, create
+from .pending import INSERT as INSERT_PENDING
+from .pending import read_pending
 from .project_parts import read_parts, write_parts
 
 PLACES = ", ".join("?" for _ in COLUMNS.split(","))
@@ -69,10 +71,14 @@ def _copy(source: sqlite3.Connection, new: Path, warn: Callable[[str], None]) ->
     if origin and checkpoint is None:
         raise Damaged(f"the state after operation {origin} cannot be read")
     _say_what_is_lost(source, origin, rows, warn)
+    pending = read_pending(source)
+    for words in pending.wrong:
+        warn(words)
     with contextlib.closing(create(new)) as target:
         target.execute("BEGIN")
         write_parts(target, texture, origin)
         target.executemany(f"INSERT INTO op ({COLUMNS}) VALUES ({PLACES})", rows)
+        target.executemany(INSERT_PENDING, pending.rows)
         target.execute("COMMIT")
         if checkpoint is not None:
             write_checkpoint(target, Content(texture), *checkpoint, origin)

@@ -1,7 +1,7 @@
 """Textures that see the shape they are on: worn edges, dirt in cavities, thin parts.
 
-They need no baked maps, as everything is asked of a signed distance ``f(points) -> values``,
-negative inside: an `Implicit`, an interpolated grid, or
+`procedural.procedural` makes them by name, too. They need no baked maps, as everything is asked of
+a signed distance ``f(points) -> values``, negative inside: an `Implicit`, an interpolated grid, or
 ``lambda points: MeshDistance(mesh)(points).distance`` with the object made once. Curvature is right
 for any function with that zero set; occlusion and thickness want distances, or bounds of them.
 """
@@ -63,7 +63,7 @@ class EdgeWear(_OnShape):
         default=0.02, metadata=means("length", "distance over which the bend is measured")
     )
     threshold: Number = field(
-        default=0.3, metadata=means("length", "bend (curvature times reach) that wears half")
+        default=0.3, metadata=means("ratio", "bend (curvature times reach) that wears half")
     )
     paint: Color = field(default="#35566b", metadata=means("color", "of the paint"))
     bare: Color = field(default="#b9b4ab", metadata=means("color", "of what is under it"))
@@ -85,7 +85,7 @@ class CavityDirt(_OnShape):
     reach: Number = field(
         default=0.1, metadata=means("length", "how far out the surroundings count")
     )
-    strength: Number = field(default=1.5, metadata=means("length", "dirt per share of occlusion"))
+    strength: Number = field(default=1.5, metadata=means("ratio", "dirt per share of occlusion"))
     clean: Color = field(default="#c8b89a", metadata=means("color", "of the clean surface"))
     dirt: Color = field(default="#33281d", metadata=means("color", "of the dirt"))
 
@@ -127,6 +127,14 @@ class Thickness(_OnShape):
 
     def _color_pair(self) -> tuple[np.ndarray, np.ndarray]:
         return premultiplied(self.thin), premultiplied(self.thick)
+
+
+ON_SHAPE: dict[str, type[_OnShape]] = {
+    "cavity_dirt": CavityDirt,
+    "edge_wear": EdgeWear,
+    "thickness": Thickness,
+}
+"""Every kind that needs a signed distance."""
 
 
 def mean_curvature(

@@ -7,9 +7,9 @@ import numpy as np
 from ..errors import TextureError
 from ..mesh import Material, Mesh
 from .camera_projection import CameraProjection
+from .detail import Level, bake_level
 from .image import Image
 from .mesh_source import MeshSource
-from .mip import bake
 from .project import Cylindrical, Decal, Planar, Spherical, Triplanar
 from .projection import Projection
 from .volume_texture import VolumeTexture
@@ -46,8 +46,11 @@ def mesh_params(mesh: Mesh) -> dict[str, Any]:
     return params
 
 
-def mesh_colors(texture: VolumeTexture, *, layer: int, level: int = 0, **mesh: Any) -> None:
-    """Fill a layer with the colours that a mesh has at the closest places; see `mesh_params`."""
+def mesh_colors(texture: VolumeTexture, *, layer: int, level: Level = 0, **mesh: Any) -> None:
+    """Fill a layer with the colours that a mesh has at the closest places; see `mesh_params`.
+
+    ``level`` is as `detail.bake_level` takes it.
+    """
     from .operation_kinds import layer_numbered
 
     materials = tuple(
@@ -55,7 +58,7 @@ def mesh_colors(texture: VolumeTexture, *, layer: int, level: int = 0, **mesh: A
         for one in mesh.pop("materials")
     )
     source = MeshSource(Mesh(**mesh, materials=materials))
-    bake(texture, layer_numbered(texture, layer), source, level=level)
+    bake_level(texture, layer_numbered(texture, layer), source, level=level)
 
 
 def project_image(
@@ -64,7 +67,7 @@ def project_image(
     layer: int,
     image: np.ndarray,
     projection: str,
-    level: int = 0,
+    level: Level = 0,
     matrix: np.ndarray | None = None,
     **options: Any,
 ) -> None:
@@ -82,9 +85,8 @@ def project_image(
     from .operation_kinds import layer_numbered
 
     found = layer_numbered(texture, layer)
-    bake(
-        texture, found, make_projection(texture, image, projection, matrix, **options), level=level
-    )
+    made = make_projection(texture, image, projection, matrix, **options)
+    bake_level(texture, found, made, level=level)
 
 
 def make_projection(

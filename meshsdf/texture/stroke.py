@@ -3,14 +3,12 @@
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
 
 from ..arrays import Points, Values
 from ..errors import TextureError
 from ..kernels.blending import MODES
 from ..kernels.brush import COPY, ERASE, PAINT, lay
 from ..kernels.brush_filters import blurred, replace, smudged
-from ..kernels.stroke_path import SAMPLE, STATE, make_dabs
 from .brush import Brush
 from .clone_source import CloneSource
 from .layer import Layer
@@ -18,17 +16,12 @@ from .mip import update_mips
 from .octree import Entries
 from .region import fill, gradient
 from .stroke_cover import Cover, Touched, run_ranges
+from .stroke_path import WHERE, Normals, StrokePath, TooManyDabs
 from .stroke_record import StrokeRecord
 from .volume_texture import VolumeTexture
 
-Normals = Float64[np.ndarray, "n 3"]
-
-MOST_DABS = 100_000  # of one batch of samples, copies included
-FARTHEST = 2.0**40  # finest texels from the origin
-SHARP_CORNER = np.sqrt(2.0)  # a stamp's corners are so many half sides from its middle
 NO_SOURCE = np.zeros((1, 1, 4), np.float32)
 REGIONS = ("fill", "gradient")
-WHERE = "Stroke.add(points, normals, pressures)"
 
 
 class Stroke:
@@ -60,12 +53,9 @@ class Stroke:
 
     def __init__(self, texture: VolumeTexture, layer: Layer, brush: Brush) -> None:
         self.texture, self.layer, self.brush = texture, layer, brush
-        self._matrices = brush.symmetry.matrices()
-        self._center = np.array(brush.symmetry.center, np.float64) / texture.octree.texel
-        self._state = np.zeros(STATE)
+        self._path = StrokePath(brush, texture.octree.texel)
         self._color = paint_of(brush)
         self._ended = False
-        self._parts: list[tuple[Points, Normals, Values]] = []
         texture.pool.use(brush.channel)
         if brush.kind not in REGIONS:
             self._cover = Cover(texture, layer, brush)
@@ -81,11 +71,7 @@ class Stroke:
     @property
     def record(self) -> StrokeRecord:
         """All that was added so far, so that it can be painted again."""
-        empty = np.empty((0, 3)), np.empty((0, 3)), np.empty(0)
-        points, normals, pressures = (
-            np.concatenate(arrays) for arrays in zip(empty, *self._parts, strict=True)
-        )
-        return StrokeRecord(self.brush, points, normals, pressures, self.layer.number)
+        return StrokeRecord(self.brush, *self._path.samples(), self.layer.number)
 
     def add(self, points: Points, normals: Normals, pressures: Values | None = None) -> None:
         """Go on to more points, and paint on the way there; regions are painted at the end.
@@ -107,14 +93,11 @@ class Stroke:
         """
         if self._ended:
             raise TextureError("the stroke has ended", WHERE, "begin another stroke")
-        pressures = np.ones(len(points)) if pressures is None else pressures
-        samples = self._samples(points, normals, pressures)
-        dabs = self._dabs(samples)
-        self._parts.append((points.copy(), normals.copy(), pressures.copy()))
+        dabs = self._path.follow(points, normals, pressures)
         if self.brush.kind in ("blur", "smudge"):
             self._filter(dabs)
         elif len(dabs) and self.brush.kind not in REGIONS:
-            self._lay(self._cover.add(dabs, len(self._matrices)))
+            self._lay(self._cover.add(dabs, self._path.copies))
 
     def end(self) -> Entries:
         """End the stroke, and bring coarser levels up to date.
@@ -151,52 +134,10 @@ class Stroke:
         if self.brush.kind == "gradient":
             ends = record.points[0], record.points[-1]
             return gradient(self.texture, self.layer, self.brush, *ends)
-        self._state[:] = 0
-        ones = np.ones(1)
-        seeds = self._dabs(self._samples(record.points[:1], record.normals[:1], ones))
+        start = StrokePath(self.brush, texel)
+        seeds = start.follow(record.points[:1], record.normals[:1], np.ones(1))
         points, normals = seeds[:, :3] * texel, np.ascontiguousarray(seeds[:, 10:13])
         return fill(self.texture, self.layer, self.brush, points, normals)
-
-    def _samples(self, points: Points, normals: Normals, pressures: Values) -> np.ndarray:
-        """(n, 8) checked samples, as `kernels.stroke_path` takes them."""
-        if not len(points) == len(normals) == len(pressures):
-            what = f"{len(points)} points, {len(normals)} normals, {len(pressures)} pressures"
-            raise TextureError(what, WHERE, "give as many of each")
-        texel, brush = self.texture.octree.texel, self.brush
-        samples = np.empty((len(points), SAMPLE))
-        np.divide(points, texel, out=samples[:, :3])
-        length = np.sqrt(np.einsum("ni,ni->n", normals, normals))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            np.divide(normals, length[:, None], out=samples[:, 3:6])
-        if not (np.abs(samples[:, :6]) <= FARTHEST).all():
-            row = int(np.flatnonzero(~(np.abs(samples[:, :6]) <= FARTHEST).all(axis=1))[0])
-            what = f"sample {row} at {points[row]} with the normal {normals[row]} makes no sense"
-            raise TextureError(what, WHERE, "give finite points near the surface, and normals")
-        if not ((pressures >= 0) & (pressures <= 1)).all():
-            what = f"a pressure of {pressures[~((pressures >= 0) & (pressures <= 1))][0]}"
-            raise TextureError(what, WHERE, "give numbers from 0 to 1")
-        radius = float(brush.radius) / texel * (1.0 if brush.stamp is None else SHARP_CORNER)
-        samples[:, 6] = radius * np.interp(pressures, *zip(*brush.pressure_radius, strict=True))
-        samples[:, 7] = float(brush.flow) * np.interp(
-            pressures, *zip(*brush.pressure_flow, strict=True)
-        )
-        return samples
-
-    def _dabs(self, samples: np.ndarray) -> np.ndarray:
-        """The next dabs, (steps times copies, 19)."""
-        brush, copies = self.brush, len(self._matrices)
-        radius = float(brush.radius) / self.texture.octree.texel
-        most = MOST_DABS // copies
-        how = (brush.discrete, float(brush.spacing), radius, self._matrices, self._center, most)
-        n = len(samples)
-        if brush.discrete:
-            n = make_dabs(samples, self._state, *how, np.empty((0, 19)))
-        if n >= most:
-            what = f"the samples are so far apart that more than {MOST_DABS} dabs lie between them"
-            raise TextureError(what, WHERE, "use a larger radius or spacing, or paint in parts")
-        dabs = np.empty((n * copies, 19))
-        make_dabs(samples, self._state, *how, dabs)
-        return dabs
 
     def _lay(self, touched: Touched) -> None:
         """Lay the paint on texels whose coverage changed."""
@@ -253,11 +194,26 @@ def paint(
     """Paint a whole stroke; the entries that changed, as `Stroke.end` gives them."""
     stroke = Stroke(texture, layer, brush)
     try:
-        stroke.add(points, normals, pressures)
+        add_all(stroke, points, normals, pressures)
     except BaseException:
         stroke.cancel()
         raise
     return stroke.end()
+
+
+def add_all(
+    stroke: Stroke, points: Points, normals: Normals, pressures: Values | None = None
+) -> None:
+    """Add the samples of several batches; in parts, if their dabs are too many for one."""
+    try:
+        stroke.add(points, normals, pressures)
+    except TooManyDabs:
+        half = len(points) // 2
+        if half == 0:
+            raise
+        for part in (slice(None, half), slice(half, None)):
+            of_part = None if pressures is None else pressures[part]
+            add_all(stroke, points[part], normals[part], of_part)
 
 
 def replay(texture: VolumeTexture, record: StrokeRecord) -> Entries:

@@ -157,15 +157,16 @@ class Cover:
         return gates
 
     def _take(self, touched: Touched) -> None:
-        """Make slots to write in for entries that were not painted yet, and hold the old ones."""
+        """Make slots to write in, and hold those of entries that were not painted yet."""
         new = self.base[touched.rows] == NOT_TAKEN
         if new.any():
             entries = touched.entries[new]
             before = self.layer.slots[entries]
             self.texture.pool.hold(before)
             self.base[touched.rows[new]] = before
-            self.texture.writable(self.layer, entries)
             self.taken.append(entries)
+        # Those painted before may be held by now, by somebody who looks on
+        self.texture.writable(self.layer, touched.entries)
 
 
 def run_ranges(work, n_items: int, cost: int) -> None:

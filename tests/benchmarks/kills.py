@@ -1,11 +1,14 @@
 """Is any acknowledged operation lost when the process is killed, over a thousand kills?
 
-python -m tests.benchmarks.kills [--n N] [--seed N]
+python -m tests.benchmarks.kills [--n N] [--seed N] [--server]
 
 Writers apply random operations to small projects and are killed (SIGKILL) at random instants: while
 a project is opened, while operations run, while checkpoints are written. After every kill a copy of
 what is left is opened: all acknowledged operations are there, once, the texels have the SHA-256 of
-the same operations done in memory alone, and SQLite finds no fault in the file.
+the same operations done in memory alone, and SQLite finds no fault in the file. With ``--server``
+it is the painting server that is killed while a client paints on it over a socket; the client
+comes back to the next server, and in the end every stroke it was told of is there, once, with all
+its samples.
 """
 
 import argparse
@@ -13,7 +16,8 @@ import sys
 import tempfile
 import time
 
-from tests.texture.kills import kill
+from tests.server.kills import kill as kill_servers
+from tests.texture.kills import kill as kill_writers
 
 from .alternate import machine
 
@@ -23,7 +27,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--n", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--server", action="store_true")
     asked = parser.parse_args()
+    kill = kill_servers if asked.server else kill_writers
     begin = time.perf_counter()
 
     def told(done: int, n_operations: int) -> None:

@@ -13,9 +13,10 @@ from meshsdf.mesh.primitives import box_mesh, icosphere
 from meshsdf.srgb import srgb_rgba
 from meshsdf.texture.atlas import atlas_for, textured, vertex_colored
 from meshsdf.texture.brush import Brush
+from meshsdf.texture.content import digest
 from meshsdf.texture.journal import Project
 from meshsdf.texture.mip import bake
-from meshsdf.texture.operations import Operation
+from meshsdf.texture.operations import Operation, perform
 from meshsdf.texture.procedural import procedural
 from meshsdf.texture.stroke_record import StrokeRecord
 from meshsdf.texture.volume_texture import VolumeTexture
@@ -61,6 +62,44 @@ def test_a_solid_texture_is_made_and_told(cli, mesh, tmp_path):
     assert again.code == 3
     assert "exists" in again.err
     assert not [path for path in tmp_path.iterdir() if path.suffix not in (".mtex", ".ply")]
+
+
+def test_a_texture_that_sees_the_shape_is_made_and_made_again_from_the_journal(cli, tmp_path):
+    mesh, out = tmp_path / "box.ply", tmp_path / "worn.mtex"
+    write_mesh(mesh, box_mesh((2.0, 2.0, 2.0)))
+    options = ["--kind", "edge-wear", "--parameter", "bare=#ffffff", "--parameter", "paint=#000000"]
+    outcome = cli("texture", "procedural", mesh, out, *options, "--resolution", 24, "--json")
+    assert outcome.code == 0
+    assert [layer["name"] for layer in outcome.json["layers"]] == ["edge-wear"]
+    with Project.open(out) as project:
+        texture = project.texture
+        rows = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]  # the middle of a side, and of an edge
+        middle, edge = texture.colors(np.array(rows), np.array([[1.0, 0, 0], [1.0, 1, 0]]))
+        assert middle[0] < 0.1 < 0.3 < edge[0]
+        before = project.digest()
+        project.undo()
+        project.redo()
+        assert project.digest() == before
+        again = VolumeTexture.around(texture.surface, resolution=24)
+        again.add_layer("edge-wear")
+        lengths = {"reach": "0.04", "bare": "#ffffff", "paint": "#000000"}
+        kind = {"layer": 0, "texture_kind": "edge-wear", "level": "auto"}
+        perform(again, Operation("bake", kind | lengths))
+        assert digest(again) == before
+
+
+def test_auto_keeps_fewer_bricks_than_all_detail_and_says_what_is_no_level(cli, mesh, tmp_path):
+    found = {}
+    for level in ("auto", "0", "2"):
+        options = ["--kind", "clouds", "--parameter", "scale=50", "--level", level]
+        out = tmp_path / f"{level}.mtex"
+        outcome = cli("texture", "procedural", mesh, out, *options, "--resolution", 96, "--json")
+        found[level] = outcome.json["n_bricks"]
+    assert found["auto"] < 0.6 * found["0"]
+    assert found["2"] < 0.2 * found["0"]
+    outcome = cli("texture", "procedural", mesh, tmp_path / "x.mtex", "--level", "fine")
+    assert outcome.code == 2
+    assert "use auto, or 0 for the finest texels" in " ".join(outcome.err.split())
 
 
 def test_layers_are_added_to_what_exists(cli, mesh, tmp_path):
@@ -171,6 +210,11 @@ def test_a_stroke_of_height_moves_the_exported_mesh(cli, mesh, tmp_path):
     [
         (["procedural", "MESH", "x.mtex", "--kind", "wod"], 3, "wood"),
         (["procedural", "MESH", "x.mtex", "--parameter", "ring=1"], 3, "ring_width"),
+        (
+            ["procedural", "MESH", "x.mtex", "--kind", "thickness", "--parameter", "thin=1"],
+            3,
+            "thin",
+        ),
         (["procedural", "MESH", "x.txt"], 2, ".mtex"),
         (["procedural", "MESH", "x.mtex", "--resolution", "64", "--texel", "1"], 2, "exclude"),
         (["procedural", "MESH", "x.mtex", "--resolution", "1e9"], 3, "ask for at most"),

@@ -27,8 +27,8 @@ def write(project_path: str, acknowledged_path: str, seed: int) -> None:
     file = os.open(acknowledged_path, os.O_WRONLY | os.O_APPEND)
     project = Project.open(project_path, warn=lambda words: os.write(file, f"! {words}\n".encode()))
     for cseq in range(n_acknowledged + 1, n_acknowledged + 1 + MOST_OPERATIONS):
-        if (CLIENT, cseq) in project._seqs:
-            seq = project._seqs[CLIENT, cseq]  # what it is does not matter: it was done
+        if (CLIENT, cseq) in project.seqs:
+            seq = project.seqs[CLIENT, cseq]  # what it is does not matter: it was done
         else:
             operation = next_of(seed, cseq, project.texture, project.history)
             seq = project.apply(operation, client=CLIENT, cseq=cseq)

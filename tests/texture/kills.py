@@ -22,8 +22,8 @@ KILLS_PER_PROJECT = 40  # the truth is carried out from the beginning, so projec
 class Worker:
     """The process that forks writers."""
 
-    def __init__(self):
-        command = [sys.executable, "-m", "tests.texture.kill_worker"]
+    def __init__(self, module="tests.texture.kill_worker"):
+        command = [sys.executable, "-m", module]
         self.process = subprocess.Popen(
             command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )

@@ -243,9 +243,9 @@ def test_a_later_format_is_refused(tmp_path):
     fresh(tmp_path).close()
     path = tmp_path / "a.mtex"
     data = bytearray(path.read_bytes())
-    struct.pack_into(">i", data, 60, 2)
+    struct.pack_into(">i", data, 60, 3)
     path.write_bytes(data)
-    with pytest.raises(TextureError, match="format 2, and this meshsdf reads up to 1"):
+    with pytest.raises(TextureError, match="format 3, and this meshsdf reads up to 2"):
         Project.open(path)
     assert path.read_bytes() == data
 
@@ -263,7 +263,7 @@ def test_replay_by_other_kernels_is_told(tmp_path, monkeypatch):
     project.apply(Operation("add-layer"))
     project._connection.close()
     project._lock.release()
-    monkeypatch.setattr(journal, "KERNEL_VERSION", 2)
+    monkeypatch.setattr(journal, "KERNEL_VERSION", 3)
     words = []
     Project.open(tmp_path / "a.mtex", warn=words.append).close()
     assert "another version of meshsdf" in words[0]

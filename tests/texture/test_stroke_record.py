@@ -10,6 +10,7 @@ from meshsdf.errors import TextureError
 from meshsdf.mesh import icosphere
 from meshsdf.texture.brush import Brush
 from meshsdf.texture.stroke import Stroke, paint, replay
+from meshsdf.texture.stroke_path import StrokePath
 from meshsdf.texture.stroke_record import StrokeRecord
 from meshsdf.texture.symmetry import Symmetry
 from meshsdf.texture.volume_texture import VolumeTexture
@@ -55,9 +56,9 @@ def test_absurd_samples_are_refused_and_paint_nothing(texture, change, message):
 def test_unequal_samples_and_endless_ways_are_refused(texture):
     layer = texture.add_layer()
     points, normals = arc(3)
-    unchecked = inspect.unwrap(Stroke._samples)  # the types of arguments say it, too, in tests
+    unchecked = inspect.unwrap(StrokePath._checked)  # the types of arguments say it, too, in tests
     with pytest.raises(TextureError, match="3 points, 2 normals, 3 pressures"):
-        unchecked(Stroke(texture, layer, Brush(0.2)), points, normals[:2], np.ones(3))
+        unchecked(StrokePath(Brush(0.2), TEXEL), points, normals[:2], np.ones(3))
     far = np.array([[0.0, 0, 1], [0, 0, 1e6]])
     with pytest.raises(TextureError, match="more than 100000 dabs"):
         paint(texture, layer, Brush(0.2, build_up=True), far, far)

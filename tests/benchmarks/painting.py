@@ -1,0 +1,360 @@
+"""The painting server under load: `meshsdf paint` as a process, painters over real sockets.
+
+python -m tests.benchmarks.painting latency MESH [--seconds 20]
+python -m tests.benchmarks.painting soak MESH [--seconds 600]
+python -m tests.benchmarks.painting storm MESH [--seconds 300]
+python -m tests.benchmarks.painting two MESH [--seconds 20]
+python -m tests.benchmarks.painting slow MESH [--seconds 60]
+
+latency  from sending a dab (60 per second, radius 25 texels) to its acknowledgement, which comes
+         after the commit; also strokes' ends.
+soak     the same for ten minutes; how much the server's memory grows, and the last minute beside
+         the first.
+storm    a painter whose connection is cut every 200 ms, beside the same strokes without cuts.
+two      two painters at once: what each was sent, and the server's own, by their SHA-256.
+slow     a page that reads a megabit per second while another paints: the server's memory.
+"""
+
+import argparse
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+from websockets.sync.client import connect
+
+from meshsdf import read_mesh
+from meshsdf.mesh.measures import area
+from meshsdf.server.client import Painter
+from meshsdf.server.messages import Hello, Type, decode, encode, encode_hello, encode_json
+from meshsdf.server.samples import Samples
+from meshsdf.spatial import ClosestPoint
+from meshsdf.texture.brush import Brush
+
+from .alternate import machine
+
+RATE = 60.0  # dabs per second
+RADIUS = 25  # texels
+STROKE = 60  # dabs
+RESOLUTION = 512
+CUT = 0.2  # seconds
+MEGABIT = 1e6 / 8  # bytes
+
+
+class Server:
+    """`meshsdf paint` on a new project of a mesh."""
+
+    def __init__(self, mesh, folder, resolution=RESOLUTION):
+        command = [
+            sys.executable, "-m", "meshsdf", "paint", str(mesh),
+            "--project", str(Path(folder) / "painted.mtex"), "--resolution", str(resolution),
+        ]  # fmt: skip
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self.address = re.search(r"http://\S+", self.process.stdout.readline())[0]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGTERM)
+        assert self.process.wait(60) == 0
+        self.process.stdout.close()
+
+    @property
+    def resident(self):
+        """Bytes of memory the server holds now."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return 1024 * int(re.search(r"VmRSS:\s+(\d+)", status)[1])
+
+
+@contextlib.contextmanager
+def served(mesh_path):
+    """A server on a new project in a folder of its own."""
+    with tempfile.TemporaryDirectory() as folder, Server(mesh_path, folder) as server:
+        yield server
+
+
+class Walk:
+    """A pointer that wanders over the surface in steps of about half a brush's radius."""
+
+    def __init__(self, mesh, texel, seed):
+        self.rng, self.closest = np.random.default_rng(seed), ClosestPoint(mesh)
+        self.step = 0.5 * RADIUS * texel
+        self.face = mesh.triangles
+        self.normals = np.cross(*(self.face[:, [1, 2]] - self.face[:, :1]).swapaxes(0, 1))
+        self.jump()
+
+    def jump(self):
+        """Go to another place."""
+        at = self.rng.integers(len(self.face))
+        self.point, self.way = self.face[at].mean(axis=0), self.rng.normal(size=3)
+
+    def next(self):
+        """The next point and its normal, each (1, 3)."""
+        self.way += 0.3 * self.rng.normal(size=3)
+        self.way /= np.linalg.norm(self.way)
+        found = self.closest((self.point + self.step * self.way)[None])
+        self.point = found.point[0]
+        return found.point, self.normals[found.face_index]
+
+
+def brush_of(painter, color):
+    """A round brush of the radius asked for, in the texture's units."""
+    return Brush(RADIUS * painter.facts["texel"], color=color, hardness=0.5)
+
+
+class Timed:
+    """A page of its own that paints at a steady pace and notes when acknowledgements come."""
+
+    def __init__(self, painter, mesh, seed=0):
+        self.painter, self.walk = painter, Walk(mesh, painter.facts["texel"], seed)
+        self.sent, self.told, self.kinds = {}, {}, {}
+        headers = {"Authorization": f"Bearer {painter._token}"}
+        url = "ws" + painter.base.removeprefix("http") + "/api/socket"
+        self.opened = connect(
+            url, additional_headers=headers, compression=None, max_size=2**26, proxy=None
+        )
+        self.socket = self.opened.__enter__()
+        self.socket.send(encode_hello(Hello(os.urandom(16).hex())))
+        self.thread = threading.Thread(target=self._listen, daemon=True)
+        self.thread.start()
+
+    def _listen(self):
+        with contextlib.suppress(Exception):
+            for data in self.socket:
+                kind, now = data[0], time.perf_counter()
+                if kind == Type.ACK:
+                    self.told[decode(data, downward=True).seq] = now
+                elif kind == Type.BRICKS:
+                    number = int.from_bytes(data[4:8], "little")
+                    self.socket.send(encode(Type.SHOWN, number))
+                elif kind == Type.ERROR:
+                    print(decode(data, downward=True).body, file=sys.stderr)
+
+    def _send(self, kind, make):
+        cseq = len(self.sent) + 1
+        frame = make(cseq)
+        self.kinds[cseq], self.sent[cseq] = kind, time.perf_counter()
+        self.socket.send(frame)
+
+    def paint(self, seconds, layer):
+        """Dabs at the rate, in strokes; returns when the last is acknowledged."""
+        begin, n = time.perf_counter(), 0
+        while (now := n / RATE) < seconds:
+            time.sleep(max(0.0, begin + now - time.perf_counter()))
+            if n % STROKE == 0:
+                if n:
+                    self._send("end", lambda seq: encode(Type.STROKE_END, seq))
+                self.walk.jump()
+                color = (*np.random.default_rng(n).random(3).tolist(), 1.0)
+                body = {"layer": layer, "brush": brush_of(self.painter, color).to_dict()}
+                self._send("begin", lambda seq, b=body: encode_json(Type.STROKE_BEGIN, b, seq))
+            point, normal = self.walk.next()
+            data = Samples(point - self.painter.origin, normal, np.ones(1)).packed()
+            self._send("dab", lambda seq, d=data: encode(Type.DABS, seq, d))
+            n += 1
+        self._send("end", lambda seq: encode(Type.STROKE_END, seq))
+        while len(self.told) < len(self.sent):
+            time.sleep(0.01)
+
+    def waits(self, kind, first=0.0, last=np.inf):
+        """Milliseconds from sending to acknowledgement, of those sent in a time of the run."""
+        begin = self.sent[1]
+        return 1e3 * np.array(
+            [
+                self.told[seq] - at
+                for seq, at in self.sent.items()
+                if self.kinds[seq] == kind and first <= at - begin < last
+            ]
+        )
+
+
+def in_words(waits):
+    """Median, 99 % and longest."""
+    middle, high = np.percentile(waits, [50, 99])
+    return f"median {middle:.1f} ms, 99 % {high:.1f} ms, longest {waits.max():.1f} ms"
+
+
+def latency(mesh_path, mesh, seconds):
+    """Time from a dab to its acknowledgement."""
+    with served(mesh_path) as server:
+        with Painter(server.address) as painter:
+            layer = painter.state["layers"][-1]["number"]
+            Timed(painter, mesh, seed=1).paint(3, layer)  # kernels are compiled or loaded
+            timed = Timed(painter, mesh)
+            timed.paint(seconds, layer)
+        for kind in ("dab", "begin", "end"):
+            waits = timed.waits(kind)
+            print(f"{kind}: {len(waits)}, {in_words(waits)}")
+
+
+def soak(mesh_path, mesh, seconds):
+    """Memory and latency over a long time."""
+    with served(mesh_path) as server:
+        sizes = []
+        with Painter(server.address) as painter:
+            layer = painter.state["layers"][-1]["number"]
+            Timed(painter, mesh, seed=1).paint(10, layer)
+            timed = Timed(painter, mesh)
+            thread = threading.Thread(target=timed.paint, args=(seconds, layer))
+            begin = time.perf_counter()
+            thread.start()
+            while thread.is_alive():
+                sizes.append((time.perf_counter() - begin, server.resident))
+                thread.join(5)
+        for at, size in sizes[:: max(1, len(sizes) // 12)]:
+            print(f"{at:6.0f} s  {size / 2**20:7.1f} MiB")
+        part = min(60.0, seconds / 4)
+        print(f"dabs in the first {part:.0f} s: {in_words(timed.waits('dab', 0, part))}")
+        print(f"dabs in the last: {in_words(timed.waits('dab', seconds - part))}")
+        middle = next(size for at, size in sizes if at >= seconds / 4)
+        print(f"memory from a quarter on: {100 * (sizes[-1][1] / middle - 1):+.1f} %")
+
+
+def strokes(painter, mesh, seconds, seed, *, cut=lambda: None):
+    """The same strokes for the same seed, about as fast as a hand."""
+    walk, layer = Walk(mesh, painter.facts["texel"], seed), painter.state["layers"][-1]["number"]
+    for n in range(int(seconds * RATE)):
+        if n % STROKE == 0:
+            if n:
+                painter.end()
+            walk.jump()
+            painter.begin(layer, brush_of(painter, (*walk.rng.random(3).tolist(), 1.0)))
+        painter.dabs(*walk.next())
+        cut()
+        time.sleep(1 / RATE)
+    painter.end()
+
+
+def storm(mesh_path, mesh, seconds):
+    """Cut the connection again and again; nothing may differ."""
+    digests = []
+    for breaks in (True, False):
+        with served(mesh_path) as server, Painter(server.address) as painter:
+            last = [time.perf_counter()]
+
+            def cut(painter=painter, last=last, breaks=breaks):
+                if breaks and time.perf_counter() - last[0] > CUT:
+                    last[0] = time.perf_counter()
+                    socket = painter._socket
+                    if socket is not None:
+                        socket.socket.close()
+
+            strokes(painter, mesh, seconds, 7, cut=cut)
+            painter.catch_up()
+            digests.append(painter.get_json("/api/digest")["project"])
+            print(f"{painter.n_connections} connections, project {digests[-1][:16]}")
+    print("equal" if digests[0] == digests[1] else "DIFFERENT")
+
+
+def two(mesh_path, mesh, seconds):
+    """Two painters at once, on one layer and with undo in between."""
+    with served(mesh_path) as server, Painter(server.address) as first:
+        with Painter(server.address) as second:
+            painters = first, second
+            threads = [
+                threading.Thread(target=strokes, args=(painter, mesh, seconds, seed))
+                for seed, painter in enumerate(painters)
+            ]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            first.undo()
+            found = [painter.catch_up() for painter in painters]
+            wanted = first.get_json("/api/digest")["shown"]
+            print(*found, wanted, "equal" if {*found} == {wanted} else "DIFFERENT")
+
+
+def slow(mesh_path, mesh, seconds):
+    """A page that hardly reads, and what it costs the server."""
+    with served(mesh_path) as server, Painter(server.address) as painter:
+        strokes(painter, mesh, 5, 1)
+        painter.catch_up()
+        sizes = []
+        for with_slow in (False, True):
+            stop = threading.Event()
+            page = Slow(painter, stop) if with_slow else None
+            before = server.resident
+            strokes(painter, mesh, seconds, 2 + with_slow)
+            painter.wait()
+            sizes.append(server.resident - before)
+            stop.set()
+            if page is not None:
+                page.thread.join()
+                print(f"the slow page got {page.n_bytes / 2**20:.1f} MiB")
+        for words, size in zip(("without it", "with it"), sizes, strict=True):
+            print(f"memory grew by {size / 2**20:.1f} MiB {words}")
+        print("it catches up:", page.catches_up())
+
+
+class Slow:
+    """A page on a line of one megabit per second."""
+
+    def __init__(self, painter, stop):
+        self.painter, self.stop, self.n_bytes = painter, stop, 0
+        self.bricks, self.newest = {}, 0
+        headers = {"Authorization": f"Bearer {painter._token}"}
+        url = "ws" + painter.base.removeprefix("http") + "/api/socket"
+        self.opened = connect(
+            url, additional_headers=headers, compression=None, max_size=2**26, max_queue=1,
+            proxy=None,
+        )  # fmt: skip
+        self.socket = self.opened.__enter__()
+        self.socket.send(encode_hello(Hello(os.urandom(16).hex())))
+        self.thread = threading.Thread(target=self._read)
+        self.thread.start()
+
+    def _read(self):
+        while not self.stop.is_set():
+            with contextlib.suppress(TimeoutError):
+                self._take(self.socket.recv(timeout=0.2), MEGABIT)
+
+    def _take(self, data, rate):
+        from meshsdf.server.wire_bricks import brick_records
+
+        self.n_bytes += len(data)
+        if rate:
+            time.sleep(len(data) / rate)
+        message = decode(data, downward=True)
+        if message.type is Type.BRICKS:
+            self.bricks |= {entry: brick for entry, _, brick in brick_records(message.body)}
+            self.socket.send(encode(Type.SHOWN, message.seq))
+
+    def catches_up(self):
+        """Whether it has what the server shows, once it may read on."""
+        from meshsdf.server.wire_bricks import bricks_digest
+
+        wanted = self.painter.get_json("/api/digest")["shown"]
+        with contextlib.suppress(TimeoutError):
+            while bricks_digest(sorted(self.bricks.items())) != wanted:
+                self._take(self.socket.recv(timeout=10), 0)
+            return True
+        return False
+
+
+def main():
+    """Run what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    work = {"latency": (latency, 20), "soak": (soak, 600), "storm": (storm, 300),
+            "two": (two, 20), "slow": (slow, 60)}  # fmt: skip
+    parser.add_argument("what", choices=work)
+    parser.add_argument("mesh", type=Path)
+    parser.add_argument("--seconds", type=float)
+    asked = parser.parse_args()
+    function, usual = work[asked.what]
+    mesh = read_mesh(asked.mesh)
+    print(machine())
+    print(f"{asked.what}: {asked.mesh.name}, {mesh.n_faces} faces, area {area(mesh):.4g}")
+    function(asked.mesh, mesh, asked.seconds or usual)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""meshsdf.server.feed: slow pages miss versions, never the end, and cost no memory."""
+
+import struct
+
+import numpy as np
+from numpy.testing import assert_array_equal
+
+from meshsdf.mesh import icosphere
+from meshsdf.server.feed import MOST_BYTES, MOST_RECORDS, Feed
+from meshsdf.server.messages import COMPLETE, decode
+from meshsdf.server.wire_bricks import WireBricks, brick_records
+from meshsdf.texture import Brush, VolumeTexture, paint
+
+from .wire_examples import painted, surface_points
+
+
+def example(resolution=48, n_strokes=8):
+    """A texture with many bricks, and what pages see of it."""
+    mesh = icosphere(subdivisions=4)
+    rng = np.random.default_rng(3)
+    texture = painted(mesh, rng, n_layers=1, n_strokes=n_strokes, resolution=resolution)
+    return texture, WireBricks(texture), mesh, rng
+
+
+def dab(texture, mesh, rng, radius=0.05):
+    """Paint somewhere."""
+    points, normals = surface_points(mesh, 1, rng)
+    color = tuple(rng.random(3).tolist())
+    paint(texture, texture.layers[0], Brush(radius, color=(*color, 1.0)), points, normals)
+    return points[0]
+
+
+class Page:
+    """What a page would hold: the bricks of all frames that it was sent."""
+
+    def __init__(self, wire, **known):
+        self.frames, self.bricks, self.versions = [], {}, {}
+        self.feed = Feed(wire, self.frames.append, **known)
+
+    def take(self, *, answer=True):
+        """Read the oldest frame and answer it; its message and entries."""
+        frame = self.frames.pop(0)
+        assert len(frame) <= MOST_BYTES
+        message = decode(frame, downward=True)
+        records = list(brick_records(message.body))
+        assert len(records) == struct.unpack_from("<I", message.body)[0]
+        for entry, version, brick in records:
+            assert version > self.versions.get(entry, 0)
+            self.bricks[entry], self.versions[entry] = brick, version
+        if answer:
+            self.feed.shown(message.seq)
+        return message, [entry for entry, _, _ in records]
+
+    def take_all(self):
+        """Read and answer until nothing comes any more; the last message."""
+        message = None
+        self.feed.refill()
+        while self.frames:
+            message, _ = self.take()
+            self.feed.refill()
+        return message
+
+    def shows(self, wire):
+        """Whether this is what a new page would get."""
+        wanted = {entry: brick for entry, _, brick in brick_records(wire.payload(wire.present))}
+        return {e: b for e, b in self.bricks.items() if b[0]} == wanted
+
+
+def test_a_new_page_gets_everything_coarse_levels_first():
+    texture, wire, _, _ = example(resolution=96, n_strokes=25)  # more than two messages hold
+    page = Page(wire)
+    page.feed.refill()
+    levels = []
+    assert len(page.frames) == 2
+    while page.frames:
+        message, entries = page.take()
+        levels += texture.octree.tables.levels[entries].tolist()
+        assert bool(message.flags & COMPLETE) == (len(page.bricks) == len(wire.present))
+        page.feed.refill()
+    assert len(levels) == len(wire.present)
+    assert levels == sorted(levels, reverse=True)
+    assert page.shows(wire)
+
+
+def test_a_page_that_never_answers_is_sent_two_messages_and_costs_nothing():
+    texture, wire, mesh, rng = example()
+    page = Page(wire)
+    for _ in range(40):
+        dab(texture, mesh, rng)
+        wire.update()
+        page.feed.refill()
+    assert len(page.frames) == 2
+    held = sum(array.nbytes for array in vars(page.feed).values() if hasattr(array, "nbytes"))
+    assert held <= 4 * texture.octree.n_entries + 4 * MOST_RECORDS
+    assert not [one for one in vars(page.feed).values() if isinstance(one, list | dict)]
+    message = page.take_all()
+    assert message.flags & COMPLETE
+    assert page.shows(wire)
+
+
+def test_a_slow_page_skips_versions_and_always_gets_the_last():
+    texture, wire, mesh, rng = example()
+    page = Page(wire)
+    page.take_all()
+    n_changed = n_told = 0
+    for number in range(60):
+        dab(texture, mesh, rng, radius=0.3)
+        n_changed += len(wire.update())
+        page.feed.refill()
+        if number % 12 == 11:
+            n_told += len(page.take()[1])
+    assert n_told < n_changed / 2
+    page.take_all()
+    assert page.shows(wire)
+
+
+def test_what_changed_comes_nearest_to_the_cursor_first():
+    texture, wire, mesh, rng = example()
+    page = Page(wire)
+    page.take_all()
+    for _ in range(20):
+        dab(texture, mesh, rng, radius=0.1)
+    wire.update()
+    cursor = np.array([0.0, 1.0, 0.0])
+    page.feed.look(np.array([9.0, 0.0, 0.0]), cursor)
+    page.feed.refill()
+    _, entries = page.take()
+    tables = texture.octree.tables
+    size = 8 * texture.octree.texel * 2.0 ** tables.levels[entries][:, None]
+    low = tables.bricks[entries] * size
+    nearest = np.clip(cursor, low, low + size)
+    away = np.linalg.norm(nearest - cursor, axis=1)
+    assert (np.diff(away) >= -1e-12).all()
+    assert away[0] < away[-1]
+
+
+def test_a_page_that_comes_back_gets_what_is_newer():
+    texture, wire, mesh, rng = example()
+    page = Page(wire)
+    page.take_all()
+    since = max(page.versions.values())
+    dab(texture, mesh, rng)
+    changed = wire.update()
+    back = Page(wire, run_is_known=True, since=since)
+    back.take_all()
+    assert_array_equal(sorted(back.bricks), changed)
+    page.bricks.update(back.bricks)
+    assert page.shows(wire)
+    unknown = Page(wire, since=since)
+    unknown.take_all()
+    assert unknown.shows(wire)
+
+
+def test_a_page_is_told_that_it_has_everything_even_if_there_is_nothing():
+    texture = VolumeTexture.around(icosphere(subdivisions=1), resolution=16)
+    wire = WireBricks(texture)
+    page = Page(wire, run_is_known=True, since=wire.revision)
+    message = page.take_all()
+    assert message.flags == COMPLETE
+    page.feed.refill()
+    assert not page.frames
