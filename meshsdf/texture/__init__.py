@@ -7,6 +7,7 @@ from .image import Image
 from .journal import Project
 from .layer import Layer
 from .layers import flatten, merge_down
+from .live import LiveStrokes
 from .mesh_source import MeshSource
 from .mip import bake, update_mips
 from .octree import Octree
@@ -19,12 +20,14 @@ from .stroke_record import StrokeRecord
 from .symmetry import Symmetry
 from .transfer import Transferred, transfer
 from .volume_texture import VolumeTexture
+from .watch import Watch
 
 __all__ = [
     "PROCEDURALS",
     "Brush",
     "Image",
     "Layer",
+    "LiveStrokes",
     "MeshSource",
     "Octree",
     "Operation",
@@ -35,6 +38,7 @@ __all__ = [
     "Symmetry",
     "Transferred",
     "VolumeTexture",
+    "Watch",
     "add_procedural",
     "atlas_colors",
     "atlas_for",
