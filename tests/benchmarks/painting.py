@@ -43,6 +43,7 @@ from .alternate import machine
 RATE = 60.0  # dabs per second
 RADIUS = 25  # texels
 STROKE = 60  # dabs
+PAUSE = 0.2  # seconds between strokes
 RESOLUTION = 512
 CUT = 0.2  # seconds
 MEGABIT = 1e6 / 8  # bytes
@@ -111,69 +112,78 @@ def brush_of(painter, color):
 
 
 class Timed:
-    """A page of its own that paints at a steady pace and notes when acknowledgements come."""
+    """A page that paints at a steady pace and notes when acknowledgements come.
 
-    def __init__(self, painter, mesh, seed=0):
-        self.painter, self.walk = painter, Walk(mesh, painter.facts["texel"], seed)
-        self.sent, self.told, self.kinds = {}, {}, {}
-        headers = {"Authorization": f"Bearer {painter._token}"}
-        url = "ws" + painter.base.removeprefix("http") + "/api/socket"
-        self.opened = connect(
-            url, additional_headers=headers, compression=None, max_size=2**26, proxy=None
+    Nothing else happens in this process while it paints: the way is laid out before.
+    """
+
+    def __init__(self, painter, mesh, seconds, seed=0):
+        self.frames = list(self._laid_out(painter, mesh, seconds, seed))
+        self.told = np.zeros(len(self.frames))
+        self.sent = np.zeros(len(self.frames))
+        self.kinds = np.array([kind for kind, _, _ in self.frames])
+        self.headers = {"Authorization": f"Bearer {painter._token}"}
+        self.url = "ws" + painter.base.removeprefix("http") + "/api/socket"
+
+    @staticmethod
+    def _laid_out(painter, mesh, seconds, seed):
+        """(kind, when to send it, frame); strokes of a second, and a pause of a fifth."""
+        walk, layer = (
+            Walk(mesh, painter.facts["texel"], seed),
+            painter.state["layers"][-1]["number"],
         )
-        self.socket = self.opened.__enter__()
-        self.socket.send(encode_hello(Hello(os.urandom(16).hex())))
-        self.thread = threading.Thread(target=self._listen, daemon=True)
-        self.thread.start()
+        when, seq = 0.0, 0
+        while when < seconds:
+            walk.jump()
+            brush = brush_of(painter, (*walk.rng.random(3).tolist(), 1.0)).to_dict()
+            seq += 1
+            body = {"layer": layer, "brush": brush}
+            yield "begin", when, encode_json(Type.STROKE_BEGIN, body, seq)
+            for _ in range(STROKE):
+                point, normal = walk.next()
+                seq += 1
+                data = Samples(point - painter.origin, normal, np.ones(1)).packed()
+                yield "dab", when, encode(Type.DABS, seq, data)
+                when += 1 / RATE
+            seq += 1
+            yield "end", when, encode(Type.STROKE_END, seq)
+            when += PAUSE
 
-    def _listen(self):
-        with contextlib.suppress(Exception):
-            for data in self.socket:
-                kind, now = data[0], time.perf_counter()
-                if kind == Type.ACK:
-                    self.told[decode(data, downward=True).seq] = now
-                elif kind == Type.BRICKS:
-                    number = int.from_bytes(data[4:8], "little")
-                    self.socket.send(encode(Type.SHOWN, number))
-                elif kind == Type.ERROR:
-                    print(decode(data, downward=True).body, file=sys.stderr)
+    def paint(self):
+        """Send everything at its time; returns when the last is acknowledged."""
+        opened = connect(
+            self.url, additional_headers=self.headers, compression=None, max_size=2**26, proxy=None
+        )
+        with opened as socket:
+            socket.send(encode_hello(Hello(os.urandom(16).hex())))
+            thread = threading.Thread(target=self._listen, args=(socket,))
+            thread.start()
+            time.sleep(1)
+            begin = time.perf_counter()
+            for n, (_, when, frame) in enumerate(self.frames):
+                time.sleep(max(0.0, begin + when - time.perf_counter()))
+                self.sent[n] = time.perf_counter()
+                socket.send(frame)
+            thread.join()
 
-    def _send(self, kind, make):
-        cseq = len(self.sent) + 1
-        frame = make(cseq)
-        self.kinds[cseq], self.sent[cseq] = kind, time.perf_counter()
-        self.socket.send(frame)
-
-    def paint(self, seconds, layer):
-        """Dabs at the rate, in strokes; returns when the last is acknowledged."""
-        begin, n = time.perf_counter(), 0
-        while (now := n / RATE) < seconds:
-            time.sleep(max(0.0, begin + now - time.perf_counter()))
-            if n % STROKE == 0:
-                if n:
-                    self._send("end", lambda seq: encode(Type.STROKE_END, seq))
-                self.walk.jump()
-                color = (*np.random.default_rng(n).random(3).tolist(), 1.0)
-                body = {"layer": layer, "brush": brush_of(self.painter, color).to_dict()}
-                self._send("begin", lambda seq, b=body: encode_json(Type.STROKE_BEGIN, b, seq))
-            point, normal = self.walk.next()
-            data = Samples(point - self.painter.origin, normal, np.ones(1)).packed()
-            self._send("dab", lambda seq, d=data: encode(Type.DABS, seq, d))
-            n += 1
-        self._send("end", lambda seq: encode(Type.STROKE_END, seq))
-        while len(self.told) < len(self.sent):
-            time.sleep(0.01)
+    def _listen(self, socket):
+        n_told = 0
+        while n_told < len(self.frames):
+            data = socket.recv()
+            now = time.perf_counter()
+            if data[0] == Type.ACK:
+                self.told[int.from_bytes(data[4:8], "little") - 1] = now
+                n_told += 1
+            elif data[0] == Type.BRICKS:
+                socket.send(encode(Type.SHOWN, int.from_bytes(data[4:8], "little")))
+            elif data[0] == Type.ERROR:
+                raise AssertionError(decode(data, downward=True).body)
 
     def waits(self, kind, first=0.0, last=np.inf):
         """Milliseconds from sending to acknowledgement, of those sent in a time of the run."""
-        begin = self.sent[1]
-        return 1e3 * np.array(
-            [
-                self.told[seq] - at
-                for seq, at in self.sent.items()
-                if self.kinds[seq] == kind and first <= at - begin < last
-            ]
-        )
+        at = self.sent - self.sent[0]
+        rows = (self.kinds == kind) & (at >= first) & (at < last)
+        return 1e3 * (self.told - self.sent)[rows]
 
 
 def in_words(waits):
@@ -186,29 +196,27 @@ def latency(mesh_path, mesh, seconds):
     """Time from a dab to its acknowledgement."""
     with served(mesh_path) as server:
         with Painter(server.address) as painter:
-            layer = painter.state["layers"][-1]["number"]
-            Timed(painter, mesh, seed=1).paint(3, layer)  # kernels are compiled or loaded
-            timed = Timed(painter, mesh)
-            timed.paint(seconds, layer)
+            warm, timed = Timed(painter, mesh, 5, seed=1), Timed(painter, mesh, seconds)
+        warm.paint()  # kernels are compiled or loaded
+        timed.paint()
         for kind in ("dab", "begin", "end"):
             waits = timed.waits(kind)
             print(f"{kind}: {len(waits)}, {in_words(waits)}")
+        print(f"all: {in_words(1e3 * (timed.told - timed.sent))}")
 
 
 def soak(mesh_path, mesh, seconds):
     """Memory and latency over a long time."""
     with served(mesh_path) as server:
-        sizes = []
         with Painter(server.address) as painter:
-            layer = painter.state["layers"][-1]["number"]
-            Timed(painter, mesh, seed=1).paint(10, layer)
-            timed = Timed(painter, mesh)
-            thread = threading.Thread(target=timed.paint, args=(seconds, layer))
-            begin = time.perf_counter()
-            thread.start()
-            while thread.is_alive():
-                sizes.append((time.perf_counter() - begin, server.resident))
-                thread.join(5)
+            warm, timed = Timed(painter, mesh, 10, seed=1), Timed(painter, mesh, seconds)
+        warm.paint()
+        sizes, begin = [], time.perf_counter()
+        thread = threading.Thread(target=timed.paint)
+        thread.start()
+        while thread.is_alive():
+            sizes.append((time.perf_counter() - begin, server.resident))
+            thread.join(5)
         for at, size in sizes[:: max(1, len(sizes) // 12)]:
             print(f"{at:6.0f} s  {size / 2**20:7.1f} MiB")
         part = min(60.0, seconds / 4)
@@ -256,21 +264,24 @@ def storm(mesh_path, mesh, seconds):
 
 def two(mesh_path, mesh, seconds):
     """Two painters at once, on one layer and with undo in between."""
-    with served(mesh_path) as server, Painter(server.address) as first:
-        with Painter(server.address) as second:
-            painters = first, second
-            threads = [
-                threading.Thread(target=strokes, args=(painter, mesh, seconds, seed))
-                for seed, painter in enumerate(painters)
-            ]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
-            first.undo()
-            found = [painter.catch_up() for painter in painters]
-            wanted = first.get_json("/api/digest")["shown"]
-            print(*found, wanted, "equal" if {*found} == {wanted} else "DIFFERENT")
+    with (
+        served(mesh_path) as server,
+        Painter(server.address) as first,
+        Painter(server.address) as second,
+    ):
+        painters = first, second
+        threads = [
+            threading.Thread(target=strokes, args=(painter, mesh, seconds, seed))
+            for seed, painter in enumerate(painters)
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        first.undo()
+        found = [painter.catch_up() for painter in painters]
+        wanted = first.get_json("/api/digest")["shown"]
+        print(*found, wanted, "equal" if {*found} == {wanted} else "DIFFERENT")
 
 
 def slow(mesh_path, mesh, seconds):
