@@ -29,13 +29,14 @@ def test_the_token_becomes_a_cookie_that_opens_everything(server):
 def test_a_wrong_token_is_refused_and_many_do_not_shut_out_the_right_one(server):
     own = {"origin": server.base}
     with httpx.Client(base_url=server.base, headers=own) as client:
-        codes = [
-            client.post("/api/session", content=json.dumps({"token": token})).status_code
-            for token in ["", "x" * 43, server.gate.key, 7, None, "é", *["guess"] * 30]
-        ]
-        assert set(codes) == {403, 429}
-        assert codes[:6] == [403] * 6
-        assert codes[-1] == 429
+
+        def tried(token):
+            return client.post("/api/session", content=json.dumps({"token": token})).status_code
+
+        for token in ("", "x" * 43, server.gate.key, 7, None, "é"):
+            assert tried(token) == 403
+        # On a slow machine it takes longer until there are too many a second
+        assert 429 in (tried("guess") for _ in range(1000))
         assert "set-cookie" not in client.post("/api/session", json={"token": "x"}).headers
         right = client.post("/api/session", json={"token": server.gate.token})
         assert right.status_code == 204
