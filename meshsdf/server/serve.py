@@ -155,7 +155,8 @@ class PatientProtocol(H11Protocol):
 
     def _watch(self) -> None:
         state = str(self.conn.their_state)
-        self._wait(state if state in PATIENCE else "")
+        has_left = self.transport.get_protocol() is not self  # for a WebSocket
+        self._wait(state if state in PATIENCE and not has_left else "")
 
     def _wait(self, state: str) -> None:
         """Give the other side its time for what is due, or for nothing."""

@@ -1,12 +1,14 @@
 """The whole server's doors: who is let in, on HTTP and on the WebSocket."""
 
 import json
+import time
 
 import httpx
 import pytest
 from websockets.exceptions import InvalidStatus
 
-from meshsdf.server.messages import Hello, Type, decode, encode_hello
+from meshsdf.server import serve
+from meshsdf.server.messages import Hello, Type, decode, encode, encode_hello
 
 from .running import cookie_of, knock, raw, running, status_of
 
@@ -100,3 +102,14 @@ def test_a_socket_opens_for_the_page_and_for_the_token(server):
         with knock(server, **given) as socket:
             socket.send(encode_hello(Hello("0" * 32)))
             assert decode(socket.recv(), downward=True).type is Type.WELCOME
+
+
+def test_a_socket_stays_open_longer_than_requests_may_take(server, monkeypatch):
+    monkeypatch.setattr(serve, "PATIENCE", {state: 0.3 for state in serve.PATIENCE})
+    with knock(server, **server.bearer) as socket:
+        socket.send(encode_hello(Hello("1" * 32)))
+        assert decode(socket.recv(), downward=True).type is Type.WELCOME
+        time.sleep(1.0)
+        socket.send(encode(Type.UNDO, 1))
+        while decode(socket.recv(timeout=5), downward=True).type not in (Type.ACK, Type.ERROR):
+            pass
