@@ -7,10 +7,9 @@ way from the dab before (16-18).
 
 import math
 
-import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, find_code
+from .octree_tables import find_code, sheets_of
 from .texture_lookup import ABSENT
 
 DAB = 19  # columns
@@ -72,12 +71,7 @@ def entries_in_reach(
                         if near > far * far:
                             continue
                         code = find_code(tables.heads, tables.pages, level, x, y, z)
-                        begin, end = np.int64(code), np.int64(code) + 1
-                        if code <= FIRST_GROUP:
-                            begin = np.int64(tables.groups[FIRST_GROUP - code, 0])
-                            end = begin + tables.groups[FIRST_GROUP - code, 1]
-                        elif code < 0:
-                            continue
+                        begin, end = sheets_of(tables.groups, code)
                         for e in range(begin, end):
                             n, n_rows = _take(e, only_stored, slots, batch, marks, n_rows, found, n)
     return n, n_rows

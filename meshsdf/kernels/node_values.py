@@ -8,7 +8,7 @@ so that what is shown depends on no texel but those it is made of.
 import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet
+from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet, sheets_of
 from .sheets import decode_normal
 from .texel_codes import F0, F1, decode
 from .texture_lookup import (
@@ -90,15 +90,11 @@ def tile_above(tables, slots, e):
             for by in range(y0 >> 3, (y1 >> 3) + 1):
                 for bz in range(z0 >> 3, (z1 >> 3) + 1):
                     code = np.int64(find_code(tables.heads, tables.pages, level, bx, by, bz))
-                    if code == NO_ENTRY:
-                        continue
-                    start, count = code, 1
                     if code <= FIRST_GROUP:
                         # The sheet that is looked up may lack nodes, which come from further up
                         complete = False
-                        start = np.int64(tables.groups[FIRST_GROUP - code, 0])
-                        count = np.int64(tables.groups[FIRST_GROUP - code, 1])
-                    for entry in range(start, start + count):
+                    begin, end = sheets_of(tables.groups, code)
+                    for entry in range(begin, end):
                         slot = slots[entry]
                         if slot == ABSENT:
                             complete = False

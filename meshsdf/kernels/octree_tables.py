@@ -81,6 +81,18 @@ def find_code(heads, pages, level, bx, by, bz):
     return pages[page, ((x & 15) << 8) + ((y & 15) << 4) + (z & 15)]
 
 
+@njit(cache=True, nogil=True, inline="always")
+def sheets_of(groups, code):
+    """The first of a brick's entries and the one after the last, by its `find_code`."""
+    begin, end = np.int64(code), np.int64(code) + 1
+    if code == NO_ENTRY:
+        begin, end = np.int64(0), np.int64(0)
+    elif code <= FIRST_GROUP:
+        begin = np.int64(groups[FIRST_GROUP - code, 0])
+        end = begin + np.int64(groups[FIRST_GROUP - code, 1])
+    return begin, end
+
+
 @njit(cache=True, nogil=True)
 def nearest_sheet(groups, sheets, code, nx, ny, nz):
     """Of a brick's sheets the one that looks most the way of (nx, ny, nz); the first on a tie."""

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from .node_values import MIXED, corner_of_cell, texel_index, tile_above
-from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, find_entry
+from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, find_entry, sheets_of
 from .sheets import decode_normal
 from .texel_codes import decode
 from .texture_lookup import ABSENT, FIRST_TILE, needed
@@ -196,21 +196,40 @@ def _is_rooted(tables, e):
 
 @njit(cache=True, nogil=True)
 def _any_exists(tables, level, nodes, facing):
-    heads, pages, groups, sheets = tables.heads, tables.pages, tables.groups, tables.sheets
-    i, j, k = nodes[0], nodes[1], nodes[2]
-    nx, ny, nz = facing[0], facing[1], facing[2]
-    base = find_entry(heads, pages, groups, sheets, level, i >> 3, j >> 3, k >> 3, nx, ny, nz)
+    base = _sheet_at(tables, level, nodes, facing)
+    found = False
     for c in range(8):
-        cx, cy, cz = c & 1, (c >> 1) & 1, c >> 2
-        if i + cx > nodes[3] or j + cy > nodes[4] or k + cz > nodes[5]:
-            continue
-        e = corner_of_cell(
-            heads, pages, groups, sheets, tables.neighbors, level, base, i, j, k, cx, cy, cz, nx,
-            ny, nz,
-        )  # fmt: skip
-        if e >= 0 and needed(tables.masks, e, texel_index(i + cx, j + cy, k + cz)):
-            return True
-    return False
+        found |= _node_in_box(tables, level, base, nodes, facing, c)[0] >= 0
+    return found
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _sheet_at(tables, level, nodes, facing):
+    """The entry around the least corner of a box of nodes that looks along ``facing``."""
+    return find_entry(
+        tables.heads, tables.pages, tables.groups, tables.sheets, level, nodes[0] >> 3,
+        nodes[1] >> 3, nodes[2] >> 3, facing[0], facing[1], facing[2],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _node_in_box(tables, level, base, nodes, facing, c):
+    """Of the c-th node of a box of at most 8 (x first): the entry that has it, or NO_ENTRY, and
+    which texel of that it is."""
+    i, j, k = nodes[0], nodes[1], nodes[2]
+    cx, cy, cz = c & 1, (c >> 1) & 1, c >> 2
+    t = texel_index(i + cx, j + cy, k + cz)
+    if i + cx > nodes[3] or j + cy > nodes[4] or k + cz > nodes[5]:
+        return np.int64(NO_ENTRY), t
+    e = np.int64(
+        corner_of_cell(
+            tables.heads, tables.pages, tables.groups, tables.sheets, tables.neighbors, level,
+            base, i, j, k, cx, cy, cz, facing[0], facing[1], facing[2],
+        )
+    )  # fmt: skip
+    if e < 0 or not needed(tables.masks, e, t):
+        return np.int64(NO_ENTRY), t
+    return e, t
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -260,14 +279,9 @@ def _is_brick_near(tables, slots, row_of, boxes, rooted, e, nodes):
             for by in range(nodes[1] >> 3, (nodes[4] >> 3) + 1):
                 for bz in range(nodes[2] >> 3, (nodes[5] >> 3) + 1):
                     code = np.int64(find_code(tables.heads, tables.pages, above, bx, by, bz))
-                    if code == NO_ENTRY:
-                        continue
-                    start, count = code, 1
-                    if code <= FIRST_GROUP:
-                        parted = True
-                        start = np.int64(tables.groups[FIRST_GROUP - code, 0])
-                        count = np.int64(tables.groups[FIRST_GROUP - code, 1])
-                    for entry in range(start, start + count):
+                    parted |= code <= FIRST_GROUP
+                    begin, end = sheets_of(tables.groups, code)
+                    for entry in range(begin, end):
                         row = row_of[entry]
                         if row >= 0 and _meet(nodes, boxes[row]):
                             return True
@@ -318,23 +332,13 @@ def _is_made_of_changed(tables, slots, row_of, bits, level, nodes, corner, facin
 def _around(tables, slots, row_of, bits, level, nodes, facing):
     """Of a box of at most 8 nodes: whether any is changed, whether any is stored, and which exist
     and are not (bits, x first); on the sheet that looks along ``facing``."""
-    heads, pages, groups, sheets = tables.heads, tables.pages, tables.groups, tables.sheets
-    i, j, k = nodes[0], nodes[1], nodes[2]
-    nx, ny, nz = facing[0], facing[1], facing[2]
-    base = find_entry(heads, pages, groups, sheets, level, i >> 3, j >> 3, k >> 3, nx, ny, nz)
+    base = _sheet_at(tables, level, nodes, facing)
     stored, missing = False, 0
     for c in range(8):
-        cx, cy, cz = c & 1, (c >> 1) & 1, c >> 2
-        if i + cx > nodes[3] or j + cy > nodes[4] or k + cz > nodes[5]:
+        e, t = _node_in_box(tables, level, base, nodes, facing, c)
+        if e < 0:
             continue
-        e = corner_of_cell(
-            heads, pages, groups, sheets, tables.neighbors, level, base, i, j, k, cx, cy, cz, nx,
-            ny, nz,
-        )  # fmt: skip
-        if e < 0 or not needed(tables.masks, e, texel_index(i + cx, j + cy, k + cz)):
-            continue
-        row, bit = (i + cx) & 7, np.uint64((((j + cy) & 7) << 3) + ((k + cz) & 7))
-        if row_of[e] >= 0 and (bits[row_of[e], row] >> bit) & np.uint64(1):
+        if row_of[e] >= 0 and (bits[row_of[e], t >> 6] >> np.uint64(t & 63)) & np.uint64(1):
             return True, stored, missing
         if slots[e] == ABSENT:
             missing |= 1 << c

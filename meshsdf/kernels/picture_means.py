@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code
+from .octree_tables import find_code, sheets_of
 from .texture_lookup import ABSENT, needed
 
 
@@ -30,13 +30,8 @@ def _all_means(tables, e, stored):
             tables.heads, tables.pages, level, 2 * tables.bricks[e, 0] + n // 9 - 1,
             2 * tables.bricks[e, 1] + n // 3 % 3 - 1, 2 * tables.bricks[e, 2] + n % 3 - 1,
         )  # fmt: skip
-        if codes[n] == NO_ENTRY:
-            continue
-        start, count = codes[n], 1
-        if codes[n] <= FIRST_GROUP:
-            start = np.int64(tables.groups[FIRST_GROUP - codes[n], 0])
-            count = np.int64(tables.groups[FIRST_GROUP - codes[n], 1])
-        for entry in range(start, start + count):
+        begin, end = sheets_of(tables.groups, codes[n])
+        for entry in range(begin, end):
             if not stored[entry]:
                 return False
     for t in range(512):
@@ -55,14 +50,9 @@ def _has_finer(tables, codes, t):
             2 * (t & 7) + d % 3 - 1,
         )
         code = codes[9 * ((x >> 3) + 1) + 3 * ((y >> 3) + 1) + (z >> 3) + 1]
-        if code == NO_ENTRY:
-            continue
-        start, count = code, 1
-        if code <= FIRST_GROUP:
-            start = np.int64(tables.groups[FIRST_GROUP - code, 0])
-            count = np.int64(tables.groups[FIRST_GROUP - code, 1])
         at = ((x & 7) << 6) + ((y & 7) << 3) + (z & 7)
-        for entry in range(start, start + count):
+        begin, end = sheets_of(tables.groups, code)
+        for entry in range(begin, end):
             if needed(tables.masks, entry, at):
                 return True
     return False

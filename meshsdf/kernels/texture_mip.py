@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet
+from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet, sheets_of
 from .sheets import MAX_SHEETS, decode_normal
 from .texel_codes import decode, encode
 from .texture_lookup import ABSENT, FIRST_TILE, needed
@@ -74,14 +74,9 @@ def parents_of(tables, entries, parents):
             for y in range(b[1] >> 1, ((b[1] + 1) >> 1) + 1):
                 for z in range(b[2] >> 1, ((b[2] + 1) >> 1) + 1):
                     code = find_code(tables.heads, tables.pages, tables.levels[e] + 1, x, y, z)
-                    first, count = code, 1
-                    if code <= FIRST_GROUP:
-                        first = tables.groups[FIRST_GROUP - code, 0]
-                        count = tables.groups[FIRST_GROUP - code, 1]
-                    if code == NO_ENTRY:
-                        continue
-                    for s in range(count):
-                        parents[i, at] = first + s
+                    begin, end = sheets_of(tables.groups, code)
+                    for entry in range(begin, end):
+                        parents[i, at] = entry
                         at += 1
         parents[i, at:] = NO_ENTRY
 
@@ -91,13 +86,9 @@ def _common_tile(groups, codes, slots):
     """The tile that all sheets of bricks are, or ABSENT."""
     tile = np.int32(0)
     for code in codes:
-        if code == NO_ENTRY:
-            continue
-        first, count = code, 1
-        if code <= FIRST_GROUP:
-            first, count = groups[FIRST_GROUP - code, 0], groups[FIRST_GROUP - code, 1]
-        for s in range(count):
-            slot = slots[first + s]
+        begin, end = sheets_of(groups, code)
+        for entry in range(begin, end):
+            slot = slots[entry]
             if slot > FIRST_TILE or (tile != 0 and slot != tile):
                 return np.int32(ABSENT)
             tile = slot
@@ -118,18 +109,13 @@ def _gather(tables, codes, slots, pool, tiles, kind, own, around, words, states)
     states[:] = MISSING
     n_sheets = 1
     for n in range(27):
-        code = codes[n]
-        if code == NO_ENTRY:
-            continue
-        first, count = code, 1
-        if code <= FIRST_GROUP:
-            first = tables.groups[FIRST_GROUP - code, 0]
-            count = tables.groups[FIRST_GROUP - code, 1]
-            n_sheets = max(n_sheets, count)
-        for s in range(count):
+        begin, end = sheets_of(tables.groups, codes[n])
+        n_sheets = max(n_sheets, end - begin)
+        for e in range(begin, end):
+            s = e - begin
             _gather_entry(
-                tables, first + s, n, slots[first + s], pool, tiles, kind, own, group, around[s],
-                words[s], states[s],
+                tables, e, n, slots[e], pool, tiles, kind, own, group, around[s], words[s],
+                states[s],
             )  # fmt: skip
     return 0 if n_sheets == 1 and group > FIRST_GROUP else n_sheets
 

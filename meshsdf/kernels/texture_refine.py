@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code
+from .octree_tables import NO_ENTRY, find_code, sheets_of
 from .texture_lookup import FIRST_TILE
 
 FAMILY = 54  # at most two sheets in each of 27 bricks
@@ -23,14 +23,9 @@ def parents_around(tables, entries, begin, end, family):
         for n in range(27):
             x, y, z = bx + n // 9 - 1, by + n // 3 % 3 - 1, bz + n % 3 - 1
             code = find_code(tables.heads, tables.pages, level, x, y, z)
-            first, count = code, 1
-            if code <= FIRST_GROUP:
-                first = tables.groups[FIRST_GROUP - code, 0]
-                count = tables.groups[FIRST_GROUP - code, 1]
-            if code == NO_ENTRY:
-                continue
-            for s in range(count):
-                family[i, at] = first + s
+            begin, end = sheets_of(tables.groups, code)
+            for entry in range(begin, end):
+                family[i, at] = entry
                 at += 1
         family[i, at:] = NO_ENTRY
 

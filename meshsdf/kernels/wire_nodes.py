@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, NO_ENTRY, SELF, find_code, find_entry
+from .octree_tables import FIRST_GROUP, NO_ENTRY, SELF, find_code, find_entry, sheets_of
 from .sheets import decode_normal
 from .texel_codes import F0
 from .texture_lookup import ABSENT, corner_entry, needed
@@ -35,13 +35,8 @@ def wanted_rows(heads, pages, groups, masks, level, bx, by, bz, exist, wanted):
     for d in range(8):
         dx, dy, dz = d >> 2, (d >> 1) & 1, d & 1
         code = np.int64(find_code(heads, pages, level, bx + dx, by + dy, bz + dz))
-        if code == NO_ENTRY:
-            continue
-        start, count = code, 1
-        if code <= FIRST_GROUP:
-            start = np.int64(groups[FIRST_GROUP - code, 0])
-            count = np.int64(groups[FIRST_GROUP - code, 1])
-        for e in range(start, start + count):
+        begin, end = sheets_of(groups, code)
+        for e in range(begin, end):
             for i in range(1 if dx else 8):
                 word = masks[e, i]
                 if word == 0:
@@ -249,12 +244,7 @@ def mark_affected(tables, made_of, deep, changed, marked):
 def _mark_brick(heads, pages, groups, level, bx, by, bz, made_of, bits, marked):
     """Mark the sheets of a brick that have these bits."""
     code = np.int64(find_code(heads, pages, level, bx, by, bz))
-    if code == NO_ENTRY:
-        return
-    start, count = code, 1
-    if code <= FIRST_GROUP:
-        start = np.int64(groups[FIRST_GROUP - code, 0])
-        count = np.int64(groups[FIRST_GROUP - code, 1])
-    for entry in range(start, start + count):
+    begin, end = sheets_of(groups, code)
+    for entry in range(begin, end):
         if made_of[entry] & bits == bits:
             marked[entry] = True
