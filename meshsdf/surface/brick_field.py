@@ -69,6 +69,15 @@ def in_ranges(
         run_pieces(lambda p: work(*ranges[p]), len(ranges), stage=stage, progress=progress)
 
 
+def field_of(
+    volume: NarrowBand | Grid, level: float, border: str, progress: Progress = silent
+) -> BrickField:
+    """`field_of_band` or `field_of_grid`, whichever suits."""
+    if isinstance(volume, NarrowBand):
+        return field_of_band(volume, level, progress)
+    return field_of_grid(volume, level, border, progress)
+
+
 def field_of_band(band: NarrowBand, level: float, progress: Progress = silent) -> BrickField:
     """Take the bricks of a band, and the missing ones whose cells the surface may enter.
 

@@ -10,7 +10,7 @@ from ..errors import SurfaceError
 from ..grid import Grid, NarrowBand
 from ..mesh import Mesh
 from ..progress import Progress, silent
-from .brick_field import field_of_band, field_of_grid
+from .brick_field import field_of
 from .cell_clamp import clamped
 from .dual_faces import join_loops
 from .dual_loops import find_loops
@@ -121,10 +121,7 @@ def dual_contouring(
     _check(volume, level, feature_angle, border)
     level = float(level)
     toward_infinity = 0.0 if border == "cap" else 0.5
-    if isinstance(volume, NarrowBand):
-        field = field_of_band(volume, level, progress)
-    else:
-        field = field_of_grid(volume, level, border, progress)
+    field = field_of(volume, level, border, progress)
     loops = find_loops(field, level, toward_infinity, progress)
     source = choose_normals(volume, mesh, level=level).kind
     if source == "mesh":

@@ -11,7 +11,7 @@ from ..grid import Grid, NarrowBand
 from ..kernels.dual_arrays import Crossings
 from ..mesh import Mesh
 from ..progress import Progress, silent
-from .brick_field import field_of_band, field_of_grid
+from .brick_field import field_of
 from .dual_faces import crossing_places, join_loops
 from .dual_loops import DualLoops, find_loops
 from .fans import separate_fans
@@ -81,10 +81,7 @@ def surface_nets(
     check_choices(border, "manifold", level, "surface_nets")
     check_level(volume, float(level), "surface_nets")
     level = float(level)
-    if isinstance(volume, NarrowBand):
-        field = field_of_band(volume, level, progress)
-    else:
-        field = field_of_grid(volume, level, border, progress)
+    field = field_of(volume, level, border, progress)
     toward_infinity = 0.0 if border == "cap" else 0.5
     loops = find_loops(field, level, toward_infinity, progress, joined=True)
     unknown = np.zeros((loops.n_crossings, 3))

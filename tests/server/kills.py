@@ -20,6 +20,7 @@ from meshsdf.texture.brush import Brush
 from meshsdf.texture.journal import Project
 from meshsdf.texture.journal_log import read_operation
 from meshsdf.texture.operations import Operation
+from tests.texture.kills import copied
 from tests.texture.random_operations import RESOLUTION, direction, small_mesh
 
 ROOT = Path(__file__).parent.parent.parent
@@ -139,7 +140,7 @@ class Trial:
         self.script.finish(painter)
         painter.catch_up()
         wanted = painter.get_json("/api/digest")["project"]
-        copy = self._copied()
+        copy = copied(self.path, self.folder / "copy")
         words = []
         with Project.open(copy, warn=words.append) as project:
             assert project.digest() == wanted, "the texels differ"
@@ -172,15 +173,6 @@ class Trial:
         assert json.loads(json.dumps(params["brush"])) == json.loads(json.dumps(brush.to_dict()))
         kept = np.hstack([params["points"], params["normals"]])
         np.testing.assert_array_equal(kept, samples)
-
-    def _copied(self):
-        folder = self.folder / "copy"
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir()
-        for end in ("", "-wal", "-lock"):
-            if Path(f"{self.path}{end}").exists():
-                shutil.copyfile(f"{self.path}{end}", folder / f"killed.mtex{end}")
-        return folder / "killed.mtex"
 
 
 def kill(folder, n, *, seed=0, told=lambda done, n_operations: None):

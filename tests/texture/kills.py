@@ -70,7 +70,7 @@ class Trial:
         lines = self.acknowledged.read_text().splitlines()
         assert not [line for line in lines if line.startswith("!")], lines
         promised = [tuple(map(int, line.split())) for line in lines]
-        copy = self._copied()
+        copy = copied(self.path, self.folder / "copy")
         words = []
         project = Project.open(copy, warn=words.append)
         assert not words, words
@@ -94,14 +94,15 @@ class Trial:
             self.twin.next()
         return self.twin.digest()
 
-    def _copied(self):
-        folder = self.folder / "copy"
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir()
-        for end in ("", "-wal", "-lock"):
-            if Path(f"{self.path}{end}").exists():
-                shutil.copyfile(f"{self.path}{end}", folder / f"killed.mtex{end}")
-        return folder / "killed.mtex"
+
+def copied(path, folder):
+    """A copy of a project as its owner's death left it, in a folder that is made anew."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    for end in ("", "-wal", "-lock"):
+        if Path(f"{path}{end}").exists():
+            shutil.copyfile(f"{path}{end}", folder / f"{path.name}{end}")
+    return folder / path.name
 
 
 def operations_of(path):

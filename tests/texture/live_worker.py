@@ -6,7 +6,6 @@ their server. It appends the number of each to the file ACKNOWLEDGED when it is 
 """
 
 import os
-import sys
 import tempfile
 
 import numpy as np
@@ -16,6 +15,7 @@ from meshsdf.texture.brush import Brush
 from meshsdf.texture.journal import Project
 from meshsdf.texture.live import LiveStrokes
 from meshsdf.texture.operations import Operation
+from tests.texture.forking import fork_on_demand
 from tests.texture.live_twin import CLIENTS, walk
 from tests.texture.random_operations import RESOLUTION, small_mesh
 
@@ -69,7 +69,7 @@ def write(project_path, acknowledged_path, seed):
         project_path, warn=lambda words: os.write(file, f"! {words}\n".encode())
     )
     for number in range(max(1, n_acknowledged - 3), n_acknowledged + MOST_MESSAGES):
-        send(live, seed, number)
+        send(live, int(seed), number)
         if number > n_acknowledged:
             os.write(file, f"{number}\n".encode())
     live.close()
@@ -84,19 +84,7 @@ def main():
         for number in range(1, 60):
             send(live, 0, number)
         live.close()
-    print("ready", flush=True)
-    while line := sys.stdin.readline():
-        project, acknowledged, seed = line.split()
-        pid = os.fork()
-        if pid == 0:
-            try:
-                write(project, acknowledged, int(seed))
-            finally:
-                os._exit(0)
-        print(pid, flush=True)
-        sys.stdin.readline()
-        os.waitpid(pid, 0)
-        print("dead", flush=True)
+    fork_on_demand(write)
 
 
 if __name__ == "__main__":
