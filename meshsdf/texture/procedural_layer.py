@@ -5,13 +5,14 @@ free wherever somebody looks closer, and every level is as free of aliasing as t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Points
 from ..kernels.texture_lookup import ABSENT
+from .change import same_texels
 from .layer import Layer
 from .lookup import Footprint
 from .mip import evaluated
@@ -91,6 +92,15 @@ def fill(texture: VolumeTexture, layer: ProceduralLayer, entries: Entries) -> No
     missing = entries[layer.slots[entries] == ABSENT]
     if len(missing):
         _evaluate(texture, layer, refine(texture, layer, missing))
+
+
+def is_painted(texture: VolumeTexture, layer: ProceduralLayer, entries: Entries) -> np.ndarray:
+    """(n,) bool: whether stored entries hold something else than what the function says."""
+    twin = replace(layer, slots=np.full_like(layer.slots, ABSENT))
+    _evaluate(texture, twin, entries)
+    same = same_texels(texture, entries, layer.slots[entries], twin.slots[entries])
+    texture.pool.drop(twin.slots[entries])
+    return ~same
 
 
 def fill_seen(

@@ -21,7 +21,7 @@ from .lookup import look_up
 from .mesh_change import MeshChange, face_normals
 from .mip import used_channels
 from .octree import Entries, Octree
-from .procedural_layer import ProceduralLayer, restart
+from .procedural_layer import ProceduralLayer, fill, is_painted, restart
 from .refine import family_of, texel_mask
 from .volume_texture import Normals, VolumeTexture
 
@@ -82,6 +82,7 @@ def transfer(
     -----
     Accuracy: bricks of any level that lie farther than two of that level's texels from every face
     that only one of the meshes has (as exact corner positions) are the same bytes.
+    Procedural layers go on by their function; bricks of theirs that were painted are carried.
     Cost: closest points on both meshes for the texels of bricks near such faces.
     Limits: which layers store a brick in levels finer than the old texture did is not decided
     anew: detail is carried over, never added.
@@ -216,15 +217,9 @@ def _carried(texture, new, layer: Layer, levels: list[_Plan]) -> Layer:
     slots = np.full(new.octree.n_entries, ABSENT, np.int32)
     made = replace(layer, slots=slots)
     if isinstance(made, ProceduralLayer) and made.function is not None:
-        restart(new, made)
+        _carry_painted(texture, new, layer, made, levels)
         return made
-    stored = np.zeros(new.octree.n_entries, bool)
-    for level, plan in enumerate(levels):
-        stored[plan.entries] |= _stored(texture, new, layer, level, plan)
-        finer = plan.entries[stored[plan.entries]]
-        if level + 1 < len(levels) and len(finer):
-            above = family_of(new, finer)
-            stored[above[above >= 0]] = True
+    stored = _to_store(texture, new, layer, levels)
     for level, plan in enumerate(levels):
         keep = stored[plan.entries]
         before = np.where(plan.old >= 0, layer.slots[plan.old], ABSENT)
@@ -234,6 +229,36 @@ def _carried(texture, new, layer: Layer, levels: list[_Plan]) -> Layer:
         if len(rest):
             _fill(texture, new, layer, made, level, plan, rest, before[rest])
     return made
+
+
+def _to_store(texture, new, layer: Layer, levels: list[_Plan]) -> np.ndarray:
+    """(e,) bool: entries that are to be stored for what the old layer stores, balanced."""
+    stored = np.zeros(new.octree.n_entries, bool)
+    for level, plan in enumerate(levels):
+        stored[plan.entries] |= _stored(texture, new, layer, level, plan)
+        finer = plan.entries[stored[plan.entries]]
+        if level + 1 < len(levels) and len(finer):
+            above = family_of(new, finer)
+            stored[above[above >= 0]] = True
+    return stored
+
+
+def _carry_painted(
+    texture, new, layer: ProceduralLayer, made: ProceduralLayer, levels: list[_Plan]
+) -> None:
+    """Let the function fill a layer anew, and lay over it what was painted onto the old one."""
+    restart(new, made)
+    fill(new, made, np.flatnonzero(_to_store(texture, new, layer, levels)).astype(np.int32))
+    for level, plan in enumerate(levels):
+        before = np.where(plan.old >= 0, layer.slots[plan.old], ABSENT)
+        known = np.flatnonzero((before != ABSENT) & (made.slots[plan.entries] != ABSENT))
+        whole = known[plan.whole[known]]
+        new.pool.drop(made.slots[plan.entries[whole]])
+        _copy(texture, new, made, plan.entries[whole], before[whole])
+        rest = known[~plan.whole[known]]
+        rest = rest[is_painted(texture, layer, plan.old[rest])]
+        if len(rest):
+            _fill(texture, new, layer, made, level, plan, rest, before[rest])
 
 
 def _stored(texture, new, layer: Layer, level: int, plan: _Plan) -> np.ndarray:

@@ -11,7 +11,7 @@ from meshsdf.io import read_mesh
 from meshsdf.mesh import Mesh, box_mesh, icosphere
 from meshsdf.texture.mesh_change import is_in
 from meshsdf.texture.mip import bake, update_mips
-from meshsdf.texture.procedural_layer import add_procedural
+from meshsdf.texture.procedural_layer import add_procedural, fill
 from meshsdf.texture.refine import refine
 from meshsdf.texture.transfer import transfer
 from meshsdf.texture.volume_texture import VolumeTexture
@@ -311,6 +311,35 @@ def test_a_procedural_layer_goes_on_by_its_function():
     tip = other.vertices[300:301]
     seen = transfer(texture, other).texture.colors(tip)
     assert_allclose(seen, waves(2.0)(tip), atol=0.1)
+
+
+def test_paint_on_a_procedural_layer_is_carried_over_and_the_function_fills_the_rest():
+    mesh = icosphere(subdivisions=3)
+    texture = VolumeTexture.around(mesh, resolution=48)
+    layer = add_procedural(texture, "waves", waves(2.0))
+    opposite = int(np.argmin(mesh.vertices @ mesh.vertices[300]))
+    tip, still = mesh.vertices[300:301], mesh.vertices[[opposite]]
+    red = np.array([1.0, 0.0, 0.0, 1.0], np.float32)
+    for place in (tip, still):
+        around = place + texture.octree.texel * 6 * np.indices((3, 3, 3)).reshape(3, -1).T
+        around -= 6 * texture.octree.texel
+        bricks = np.floor(around / (8 * texture.octree.spacing(0))).astype(np.int64)
+        own = np.unique(texture.octree.find(0, bricks, np.repeat(place, 27, axis=0)))
+        own = own[own >= 0].astype(np.int32)
+        fill(texture, layer, own)
+        texture.put(layer, own, np.tile(red, (len(texture.places(own)[0]), 1)))
+    other = moved_vertex(mesh, 300, 0.05 * mesh.vertices[300])
+    new = transfer(texture, other).texture
+    assert_allclose(new.colors(other.vertices[[300, opposite]]), [red, red], atol=0.05)
+    elsewhere = np.random.default_rng(0).normal(size=(200, 3))
+    elsewhere /= np.linalg.norm(elsewhere, axis=1, keepdims=True)
+    far = (np.linalg.norm(elsewhere - tip, axis=1) > 0.7) & (
+        np.linalg.norm(elsewhere - still, axis=1) > 0.7
+    )
+    expected = waves(2.0)(elsewhere[far])
+    assert_allclose(new.colors(elsewhere[far]), expected, atol=0.1)
+    held = [layer.slots[layer.slots >= 0] for layer in new.layers]
+    assert new.pool.n_used == len(np.concatenate(held))
 
 
 def test_a_mesh_of_another_size_gets_other_levels_and_keeps_its_paint():
