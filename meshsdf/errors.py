@@ -58,7 +58,7 @@ class RayError(MeshsdfError):
 
 
 class TextureError(MeshsdfError):
-    """A texture in space cannot be made, changed or kept as asked."""
+    """A texture, in space or in an image, cannot be made, changed, kept or looked up as asked."""
 
 
 class ReportError(MeshsdfError):

@@ -39,9 +39,10 @@ def choose_paint(mesh: Mesh, paint: np.ndarray | PointPaint | None) -> SeenPaint
         )
     if mesh.vertex_colors is None and mesh.material_index is None:
         return lambda seen: np.tile(CLAY, (len(seen), 1))
-    from ..surface.carry import colors_at  # late: clay does not need the extractors
+    from ..spatial.mesh_colors import MeshColors  # late: clay does not need images
 
-    return lambda seen: colors_at(mesh, seen.face, seen.barycentric)[:, :3].astype(np.float64)
+    colors = MeshColors(mesh)
+    return lambda seen: colors(seen.face, seen.barycentric)[:, :3].astype(np.float64)
 
 
 def _checked(colors: np.ndarray, n: int, per: str) -> Colors:

@@ -9,7 +9,7 @@ from ..errors import SurfaceError
 from ..grid import NarrowBand
 from ..grid.brick_grid import node_mask
 from ..mesh import Mesh
-from .carry import colors_at
+from ..spatial.mesh_colors import MeshColors
 
 CARRIED_VOXELS = ("closest", "uv", "Cd")
 """World position of the closest point; texture coordinates there, then 0; linear RGB there."""
@@ -66,7 +66,7 @@ def carried_in_bricks(
     weights = np.stack([1.0 - second - third, second, third], axis=1)
     out = np.zeros((*active.shape, 3), np.float32)
     if name == "Cd":
-        out[active] = colors_at(source, face, weights)[:, :3]
+        out[active] = MeshColors(source)(face, weights)[:, :3]
     elif name == "uv":
         corners = source.uv[source.faces[face]]
         out[active, :2] = np.einsum("nkc,nk->nc", corners, weights)

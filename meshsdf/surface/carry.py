@@ -9,14 +9,14 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float32, Float64
+from jaxtyping import Float64
 
-from ..arrays import Barycentrics, FaceLabels, Indices, Points2
+from ..arrays import Barycentrics, FaceLabels, Points2
 from ..errors import SurfaceError
 from ..mesh import Mesh
 from ..progress import Progress, silent
 from ..spatial import ClosestPoint
-from ..srgb import linear_from_srgb
+from ..spatial.mesh_colors import MeshColors
 
 CARRIED = ("colours", "uv")
 
@@ -61,7 +61,7 @@ def carry(
     query = ClosestPoint(source)
     found = query(surface.vertices, progress=progress)
     if "colours" in what:
-        colours = colors_at(source, found.face_index, found.barycentric)
+        colours = MeshColors(source)(found.face_index, found.barycentric)
         surface = replace(surface, vertex_colors=colours)
     if "uv" in what:
         middles = query(surface.triangles.mean(axis=1), progress=progress)
@@ -90,50 +90,6 @@ def _check(surface: Mesh, source: Mesh, what: Collection[str]) -> None:
 def _blend(corners: np.ndarray, barycentric: Barycentrics) -> np.ndarray:
     """Attributes (n, 3, c) of the corners, weighted."""
     return np.einsum("nkc,nk->nc", corners, barycentric)
-
-
-def colors_at(source: Mesh, face: Indices, barycentric: Barycentrics) -> Float32[np.ndarray, "n 4"]:
-    """Linear RGBA at places on the source: vertex colour times base colour times image."""
-    colours = np.ones((len(face), 4))
-    corners = source.faces[face]
-    if source.vertex_colors is not None:
-        colours *= _blend(source.vertex_colors[corners].astype(np.float64), barycentric)
-    if source.material_index is not None:
-        material = source.material_index[face]
-        for number in np.unique(material[material >= 0]):
-            here = np.flatnonzero(material == number)
-            look = source.materials[number]
-            colours[here] *= look.base_color
-            if look.image is not None and source.uv is not None:
-                uv = _blend(source.uv[corners[here]], barycentric[here])
-                colours[here] *= sample_image(look.image, uv)
-    return colours.astype(np.float32)
-
-
-def sample_image(image: np.ndarray, uv: Points2) -> Float64[np.ndarray, "n 4"]:
-    """Interpolate an sRGB image (h, w, 1 to 4) uint8 bilinearly, in linear light, repeating it.
-
-    Texture coordinate (0, 0) is the image's lower left corner, texel centers lie half a texel in.
-    """
-    height, width, n_channels = image.shape
-    decoded = linear_from_srgb(np.arange(256) / 255.0)
-    has_alpha = n_channels in (2, 4)
-    n_colours = n_channels - has_alpha
-    rgba = np.ones((height, width, 4))
-    rgba[..., :3] = decoded[image[..., :n_colours]]
-    if has_alpha:
-        rgba[..., 3] = image[..., -1] / 255.0
-    x, y = uv[:, 0] * width - 0.5, (1.0 - uv[:, 1]) * height - 0.5
-    left, top = np.floor(x), np.floor(y)
-    tx, ty = (x - left)[:, None], (y - top)[:, None]
-    i, j = top.astype(np.int64), left.astype(np.int64)
-
-    def texel(down: int, right: int) -> np.ndarray:
-        return rgba[(i + down) % height, (j + right) % width]
-
-    upper = texel(0, 0) * (1 - tx) + texel(0, 1) * tx
-    lower = texel(1, 0) * (1 - tx) + texel(1, 1) * tx
-    return upper * (1 - ty) + lower * ty
 
 
 def _with_uv(surface: Mesh, source: Mesh, own: Points2, middle: FaceLabels) -> Mesh:

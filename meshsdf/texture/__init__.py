@@ -1,9 +1,9 @@
 """Colour in space: textures that are kept where the surface is, and need no UVs."""
 
+from ..spatial.image import Image
 from .atlas import atlas_colors, atlas_for, textured, vertex_colored
 from .brush import Brush, Stencil
 from .displace import displaced_band
-from .image import Image
 from .journal import Project
 from .layer import Layer
 from .layers import flatten, merge_down

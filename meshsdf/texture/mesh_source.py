@@ -6,8 +6,8 @@ from jaxtyping import Float64
 from ..arrays import Barycentrics, Indices, Number, Points, Values
 from ..mesh import Mesh
 from ..spatial import ClosestPoint
+from ..spatial.mesh_colors import MeshColors
 from .channels import Numbers
-from .uv_image import MeshColors
 
 STEPS = (1.0, 2.0, 4.0)  # how far to look past a sheet of the other side, in footprints
 

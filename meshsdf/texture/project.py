@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Number, Points, Points2
 from ..errors import TextureError
-from .image import Colors
+from ..spatial.image import Colors
 from .projection import (
     Gradients,
     Linear,
@@ -42,7 +42,7 @@ class Planar(Mapped):
 
     Examples
     --------
-    >>> from meshsdf.texture.image import Image
+    >>> from meshsdf.spatial.image import Image
     >>> image = Image.from_linear(np.array([[[0.0], [1.0]]], np.float32))
     >>> Planar(image, width=2)(np.array([[0.5, 7.0, 7.0], [1.0, 0.0, 0.0]]))
     array([[0. , 0. , 0. , 1. ],

@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float64
 from ..arrays import Matrix4, Number, Points, Points2
 from ..errors import TextureError
 from ..kernels.parallel import even_ranges, run_pieces
-from .image import Colors, Image, Lengths, Widths, check_finite, check_wraps, uv_widths
+from ..spatial.image import Colors, Image, Lengths, Widths, check_finite, check_wraps, uv_widths
 
 Gradients = Float64[np.ndarray, "k 2 3"]  # of u and v, per unit of length
 Normals = Float64[np.ndarray, "normals 3"]

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..errors import TextureError
 from ..mesh import Material, Mesh
+from ..spatial.image import Image
 from .camera_projection import CameraProjection
 from .detail import Level, bake_level
-from .image import Image
 from .mesh_source import MeshSource
 from .project import Cylindrical, Decal, Planar, Spherical, Triplanar
 from .projection import Projection

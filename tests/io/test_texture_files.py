@@ -8,9 +8,9 @@ from meshsdf.io.pictures import write_picture
 from meshsdf.io.vdb import read_vdb_grids
 from meshsdf.io.vdb_texture import write_vdb_texture
 from meshsdf.mesh.primitives import box_mesh, icosphere
+from meshsdf.spatial.image import Image
 from meshsdf.srgb import linear_from_srgb, srgb_rgba
 from meshsdf.texture.atlas import atlas_colors, atlas_for, textured, vertex_colored
-from meshsdf.texture.image import Image
 from meshsdf.texture.mesh_source import MeshSource
 from meshsdf.texture.mip import bake
 from meshsdf.texture.volume_texture import VolumeTexture

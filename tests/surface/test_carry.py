@@ -11,8 +11,7 @@ from meshsdf import Mesh, check, marching_cubes, mesh_to_band, read_mesh
 from meshsdf.errors import SurfaceError
 from meshsdf.mesh import Material
 from meshsdf.mesh.primitives import box_mesh, icosphere
-from meshsdf.srgb import linear_from_srgb
-from meshsdf.surface.carry import carry, sample_image
+from meshsdf.surface.carry import carry
 
 WHITE = np.ones(4, np.float32)
 
@@ -56,27 +55,6 @@ def test_vertex_colours_that_vary_linearly_come_back_exactly():
     assert np.quantile(off, 0.99) < 1e-7
     assert off.max() < 1e-4  # where two faces are equally near, rounding chooses
     assert (found.faces == surface.faces).all()
-
-
-def test_images_are_interpolated_in_linear_light_and_repeat():
-    image = np.array([[[0], [255]], [[128], [64]]], np.uint8)
-    light = linear_from_srgb(image[:, :, 0] / 255)
-    uv = np.array(
-        [[0.25, 0.75], [0.75, 0.75], [0.25, 0.25], [0.5, 0.75], [1.25, 1.75], [0.0, 0.25]]
-    )
-    expected = [
-        light[0, 0],
-        light[0, 1],
-        light[1, 0],
-        light[0].mean(),
-        light[0, 0],
-        light[1].mean(),
-    ]
-    found = sample_image(image, uv)
-    assert np.abs(found[:, 0] - expected).max() < 1e-12
-    assert (found[:, 3] == 1).all()
-    with_alpha = np.dstack([image, np.full((2, 2, 1), 51, np.uint8)])
-    assert np.abs(sample_image(with_alpha, uv)[:, 3] - 0.2).max() < 1e-12
 
 
 def test_texture_coordinates_keep_their_seam():

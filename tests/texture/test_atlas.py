@@ -10,9 +10,9 @@ from meshsdf.io import read_mesh
 from meshsdf.kernels.uv_raster import NO_FACE, draw_faces
 from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere
+from meshsdf.spatial.image import Image
 from meshsdf.srgb import srgb_rgba
 from meshsdf.texture.atlas import atlas_for, pull_push, textured, vertex_colored
-from meshsdf.texture.image import Image
 from meshsdf.texture.mesh_source import MeshSource
 from meshsdf.texture.mip import bake
 from meshsdf.texture.procedural import procedural

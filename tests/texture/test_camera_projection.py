@@ -10,8 +10,8 @@ from meshsdf.implicit import sphere
 from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import icosphere
 from meshsdf.mesh.tubes import trefoil_tube
+from meshsdf.spatial.image import Image
 from meshsdf.texture.camera_projection import CameraProjection
-from meshsdf.texture.image import Image
 
 EYE, TARGET = np.array([2.0, -3.0, 1.5]), np.array([0.1, 0.2, -0.1])
 UP = np.array([0.0, 0.0, 1.0])

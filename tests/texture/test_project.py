@@ -5,9 +5,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from meshsdf.errors import TextureError
+from meshsdf.spatial.image import Image
 from meshsdf.srgb import srgb_rgba
 from meshsdf.texture.camera_projection import CameraProjection
-from meshsdf.texture.image import Image
 from meshsdf.texture.project import Cylindrical, Decal, Planar, Spherical, Triplanar
 
 ULP = 2.0**-24

@@ -1,4 +1,4 @@
-"""meshsdf.texture.image: colours of an image at coordinates, filtered in linear light."""
+"""meshsdf.spatial.image: colours of an image at coordinates, filtered in linear light."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.ndimage import map_coordinates
 
 from meshsdf.errors import TextureError
-from meshsdf.texture.image import Image
+from meshsdf.spatial.image import Image
 
 ULP = 2.0**-24  # half a unit in the last place of float32, of numbers up to 1
 SCIPY_MODES = {

@@ -1,4 +1,4 @@
-"""meshsdf.texture.uv_image: what colours a mesh says it has."""
+"""meshsdf.spatial.mesh_colors: what colours a mesh says it has."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from meshsdf.errors import TextureError
 from meshsdf.io import read_mesh
 from meshsdf.mesh import Material, Mesh
 from meshsdf.mesh.primitives import box_mesh
-from meshsdf.texture.uv_image import MeshColors, uv_density
+from meshsdf.spatial.mesh_colors import MeshColors, uv_density
 from tests.models import model, needs_models
 
 TINT = np.array([0.5, 1.0, 0.25, 1.0], np.float32)

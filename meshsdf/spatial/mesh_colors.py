@@ -4,6 +4,8 @@ Vertex colours, base colour and image are factors of one product, as glTF 2.0 ha
 lacks is white, and a face that has none of them is grey.
 """
 
+from functools import cached_property
+
 import numpy as np
 from jaxtyping import Float64
 
@@ -58,9 +60,13 @@ class MeshColors:
         self.vertex_colors = None
         if mesh.vertex_colors is not None:
             self.vertex_colors = mesh.vertex_colors.astype(np.float64)
-        self.density = np.zeros((mesh.n_faces, 2))
-        if any(self.images) and mesh.n_faces:
-            self.density = uv_density(mesh)
+
+    @cached_property
+    def density(self) -> Float64[np.ndarray, "m 2"]:
+        """`uv_density` of the mesh; zeros if there are no images."""
+        if any(self.images) and self.mesh.n_faces:
+            return uv_density(self.mesh)
+        return np.zeros((self.mesh.n_faces, 2))
 
     def __call__(
         self,
