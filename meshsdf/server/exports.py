@@ -4,6 +4,7 @@ A page names a file, never a place. What was written in this run may be written 
 file of that name stays as it is, and a number goes into the new one's name.
 """
 
+import glob
 import math
 import os
 import re
@@ -76,16 +77,21 @@ class Written:
 class Exports:
     """The exports of one project, into its own folder.
 
+    What an earlier owner of the project left half written when it was killed is deleted.
+
     Parameters
     ----------
-    folder : Path
-        Where the project is.
+    project : Path
+        The project, which nobody else has open.
     size : int
         Of images, pixels a side; more where a mesh has more faces than fit.
     """
 
-    def __init__(self, folder: Path, size: int = 2048) -> None:
-        self.folder = Path(os.path.realpath(folder))
+    def __init__(self, project: Path, size: int = 2048) -> None:
+        self.folder = Path(os.path.realpath(project.parent))
+        self._prefix = f".meshsdf-{project.name}-"
+        for left in self.folder.glob(f"{glob.escape(self._prefix)}*"):
+            shutil.rmtree(left, ignore_errors=True)
         self.size = size
         self._own: dict[str, tuple[int, ...]] = {}  # what tells the files that we wrote
         self._lock = threading.Lock()
@@ -171,7 +177,7 @@ class Exports:
     @contextmanager
     def _folder_beside(self) -> Iterator[Path]:
         """A folder for unfinished files, on the disk where they are to be."""
-        self._beside = tempfile.mkdtemp(prefix=".meshsdf-", dir=self.folder)
+        self._beside = tempfile.mkdtemp(prefix=self._prefix, dir=self.folder)
         try:
             yield Path(self._beside)
         finally:

@@ -76,7 +76,7 @@ def paint(
         live.close()
         raise
     gate = Gate(listening.getsockname()[1], place.address)
-    exports = Exports(live.project.path.parent)
+    exports = Exports(live.project.path)
     parts = {"images": Images(), "exports": exports, "name": name}
     service = Service(studio, gate, mesh=mesh or live.project.texture.surface, **parts)
 

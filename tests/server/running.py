@@ -74,7 +74,7 @@ def running(folder: Path, static: Path | None = None) -> Iterator[Running]:
     studio = Studio(LiveStrokes.open(file))
     listening = listen("127.0.0.1", 0)
     gate = Gate(listening.getsockname()[1])
-    parts = {"images": Images(), "exports": Exports(folder, 64), "name": "ball"}
+    parts = {"images": Images(), "exports": Exports(file, 64), "name": "ball"}
     service = Service(studio, gate, mesh=studio.texture.surface, **parts)
     server = server_of(make_app(service, static or folder / "static"))
     ready = threading.Event()

@@ -2,6 +2,8 @@
 
 import os
 import string
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -32,7 +34,7 @@ def texture():
 
 @pytest.fixture
 def exports(tmp_path):
-    return Exports(tmp_path, size=128)
+    return Exports(tmp_path / "painted.mtex", size=128)
 
 
 def copying(data: bytes):
@@ -142,7 +144,7 @@ def test_no_link_leads_out_of_the_folder(texture, tmp_path):
     (outside / "a.glb").write_text("precious")
     (inside / "a.glb").symlink_to(outside / "a.glb")
     (inside / "b.glb").symlink_to(outside / "new.glb")
-    exports = Exports(inside, size=128)
+    exports = Exports(inside / "painted.mtex", size=128)
     assert exports.write("a.glb", texture, MESH).names == ("a-2.glb",)
     assert exports.write("b.glb", texture, MESH).names == ("b-2.glb",)
     exports.write("c.glb", texture, MESH)
@@ -153,6 +155,24 @@ def test_no_link_leads_out_of_the_folder(texture, tmp_path):
     assert exports.write("c.glb", texture, MESH).names == ("c-2.glb",)
     assert os.listdir(outside) == ["a.glb"]
     assert (outside / "a.glb").read_text() == "precious"
+
+
+def test_what_a_killed_owner_left_half_written_is_deleted(texture, tmp_path):
+    code = """
+import os, sys
+from pathlib import Path
+from meshsdf.server.exports import Exports
+exports = Exports(Path(sys.argv[1]))
+exports.save_project("copy.mtex", lambda path: (path.write_bytes(b"half"), os._exit(9)))
+"""
+    script = [sys.executable, "-c", code]
+    for name in ("painted.mtex", "other.mtex"):
+        assert subprocess.run([*script, str(tmp_path / name)]).returncode == 9
+    assert len(os.listdir(tmp_path)) == 2
+    exports = Exports(tmp_path / "painted.mtex", size=128)
+    (left,) = os.listdir(tmp_path)  # the other's
+    exports.write("a.ply", texture, MESH)
+    assert sorted(os.listdir(tmp_path)) == [left, "a.ply"]
 
 
 @pytest.mark.parametrize(
