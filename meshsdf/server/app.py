@@ -51,7 +51,6 @@ from .security import App, Gate, Guard, Receive, Scope, Send
 from .socket import serve_socket
 from .static_page import MISSING_PAGE, has_page
 from .studio import Studio
-from .wire_bricks import WireBricks
 
 CHUNK = 1 << 18  # bytes handed over at once of a long answer
 NO_ROOM, SILENT = 1013, 1008  # close a WebSocket: "try again later", "policy violation" (IANA)
@@ -116,7 +115,7 @@ class Service:
         if not 0 <= last - first <= MOST_BRICKS:
             what = f"entries {first} to {last} are no range of up to {MOST_BRICKS}"
             raise Refused(400, what, "GET /api/bricks", "ask for fewer at a time")
-        payload = await self.studio.do(_payload, self.studio.bricks, first, last)
+        payload = await self.studio.do(_payload, self.studio, first, last)
         return _tagged(request, payload, _tag(payload))
 
     async def digest(self, request: Request) -> Response:
@@ -219,13 +218,13 @@ def make_app(service: Service, static: Path = STATIC) -> App:
     return Guard(Starlette(routes=routes, exception_handlers=handlers), service.gate)
 
 
-def _payload(bricks: WireBricks, first: int, last: int) -> bytes:
-    bricks.update()
-    return bricks.range_payload(first, last)
+def _payload(studio: Studio, first: int, last: int) -> bytes:
+    studio.look()
+    return studio.bricks.range_payload(first, last)
 
 
 def _digests(studio: Studio) -> dict[str, str]:
-    studio.bricks.update()
+    studio.look()
     return {"project": studio.project.digest(), "shown": studio.bricks.digest()}
 
 

@@ -1,8 +1,11 @@
 """A project served to painters, from its opening to its close: what `meshsdf paint` runs."""
 
+import gc
 import ipaddress
 import socket as sockets
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from ..errors import ServerError
@@ -17,6 +20,7 @@ from .serve import listen, serve, server_of
 from .studio import Studio
 
 USUAL_PORT = 8757  # of no service that IANA's registry names
+SWITCH_SECONDS = 0.0005  # a thread that computes lets others go on so often
 UNSEEN = ("192.0.2.1", "2001:db8::1")  # addresses that nobody has (RFC 5737, RFC 3849)
 
 
@@ -85,7 +89,25 @@ def paint(
         await studio.close()
 
     address = f"http://{seen_address(place.address)}:{gate.port}/#t={gate.token}"
-    serve(server_of(make_app(service)), listening, ready=lambda: ready(address), close=close)
+    with _at_the_ready():
+        serve(server_of(make_app(service)), listening, ready=lambda: ready(address), close=close)
+
+
+@contextmanager
+def _at_the_ready() -> Iterator[None]:
+    """Let nobody wait long for the interpreter: not for others, nor for what was made at the start.
+
+    The garbage collector would look at hundreds of thousands of objects that stay.
+    """
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_SECONDS)
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        sys.setswitchinterval(before)
 
 
 def _listening(place: Place) -> sockets.socket:

@@ -1,5 +1,6 @@
-"""What a page's durable messages do to the project; on the studio's thread."""
+"""What durable messages do to the project; on the studio's thread, or on its intake."""
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from .messages import Message, OperationAsked, StrokeBegin, Type
 from .samples import Samples
 
 MOST_REFUSED = 1024  # messages whose refusal is remembered, should they come again
+_REFUSING = threading.Lock()
 BAD_VALUES = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, MemoryError)
 
 
@@ -49,9 +51,10 @@ class Requests:
             what = f"this makes no sense: {words or type(error).__name__}"
             fix = "see what brushes and operations take"
             told = ServerError(what, message.type.name, fix)
-        refused[client, message.seq] = told
-        while len(refused) > MOST_REFUSED:
-            del refused[next(iter(refused))]
+        with _REFUSING:
+            refused[client, message.seq] = told
+            while len(refused) > MOST_REFUSED:
+                del refused[next(iter(refused))]
         raise told
 
     def _carry_out(self, client: str, message: Message) -> int:
@@ -65,7 +68,7 @@ class Requests:
             live.begin(client, cseq, body.layer, brush)
         elif isinstance(body, Samples):
             points = body.points + self.studio.origin
-            live.add(client, cseq, points, body.normals, body.pressures)
+            live.keep(client, cseq, points, body.normals, body.pressures)
         elif isinstance(body, OperationAsked):
             return self._apply(client, cseq, self._operation(body), replaces=body.replaces)
         elif message.type is Type.STROKE_END:

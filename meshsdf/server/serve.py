@@ -19,7 +19,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from ..errors import ServerError
 from .limits import BODY_SECONDS, HEAD_SECONDS, MOST_CONNECTIONS, MOST_FRAME, MOST_HEAD, MOST_QUEUED
-from .security import App
+from .security import App, Receive, Scope, Send
 
 SIGNALS = tuple(
     getattr(signal, name)
@@ -173,7 +173,7 @@ class PatientProtocol(H11Protocol):
 def server_of(app: App) -> PaintServer:
     """The server of an app, not yet running."""
     config = uvicorn.Config(
-        app,
+        _ending_well(app),
         loop="asyncio",
         http=PatientProtocol,
         ws="websockets-sansio",
@@ -190,6 +190,27 @@ def server_of(app: App) -> PaintServer:
         proxy_headers=False,  # what they say of where a request is from could be made up
     )
     return PaintServer(config)
+
+
+def _ending_well(app: App) -> App:
+    """An app whose answers may be broken off when the server ends; whoever waits is told so."""
+
+    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
+        begun = False
+
+        async def note(message: Any) -> None:
+            nonlocal begun
+            begun = True
+            await send(message)
+
+        try:
+            await app(scope, receive, note)
+        except asyncio.CancelledError:
+            if scope["type"] == "http" and not begun:
+                await send({"type": "http.response.start", "status": 503, "headers": []})
+                await send({"type": "http.response.body", "body": b""})
+
+    return answer
 
 
 async def _announce(server: uvicorn.Server, ready: Callable[[], None]) -> None:

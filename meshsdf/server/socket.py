@@ -69,6 +69,8 @@ class Page:
         self._state: dict[str, Any] | None = None
         self._wake = asyncio.Event()
         self._room = asyncio.Semaphore(MOST_UNANSWERED)
+        self._last: asyncio.Future | None = None
+        self._last_was_samples = False
         self._is_replaced = False
 
     async def serve(self) -> None:
@@ -89,7 +91,7 @@ class Page:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            await self.studio.unsubscribe(self)
+            self.studio.unsubscribe(self)
             self.studio.depart(self.client, self)
         for task in () if self._is_replaced else done:
             task.result()  # or what ended it
@@ -151,12 +153,11 @@ class Page:
         known = {"run_is_known": hello.run == self.studio.run, "since": hello.since}
         bricks = self.studio.bricks
         self.feed = await self.studio.do(partial(Feed, bricks, self._send_soon, **known))
-        await self.studio.subscribe(self)
+        self.studio.subscribe(self)
         while (message := await self._next()) is not None:
             if message.type in DURABLE:
                 await self._room.acquire()
-                work = self.requests.carry_out, self.client, message
-                asked = await self.studio.ask(*work)
+                asked = await self._asked(message)
                 asked.add_done_callback(partial(self._answer, message.seq))
             elif message.type is Type.SHOWN:
                 await self.studio.ask(self.feed.shown, message.seq)
@@ -165,6 +166,16 @@ class Page:
             else:
                 what = f"{message.type.name} came again"
                 raise ServerError(what, "a message of the painting page", "send it once, first")
+
+    async def _asked(self, message: Message) -> asyncio.Future:
+        """Have a durable message done, after those before it; samples have their own thread."""
+        is_samples = message.type is Type.DABS
+        if self._last is not None and is_samples is not self._last_was_samples:
+            await asyncio.wait([self._last])
+        ask = self.studio.ask_intake if is_samples else self.studio.ask
+        self._last = await ask(self.requests.carry_out, self.client, message)
+        self._last_was_samples = is_samples
+        return self._last
 
     async def _look(self, view: View) -> None:
         origin = self.studio.origin

@@ -3,6 +3,9 @@
 Everything that reads or changes the project runs there, one thing after another; whoever asks
 awaits the outcome. When something changed, all that was asked for by then is done first (for at
 most `TICK` seconds), then the pages are told once.
+
+Samples of strokes have a second thread, the intake: it puts them on the disk, and so they are
+acknowledged, while the first one paints what came before and makes pictures of it.
 """
 
 import asyncio
@@ -26,6 +29,7 @@ R = TypeVar("R")
 
 TICK = 0.016  # seconds
 MOST_WAITING = 256  # things asked for and not yet done
+MOST_UNPAINTED = 64  # batches of samples; others are not taken in before
 PATIENCE = 30.0  # seconds
 
 
@@ -76,6 +80,7 @@ class Studio:
         self._n_seqs = 0
         self._subscribers: list[Subscriber] = []
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="studio")
+        self._intake = ThreadPoolExecutor(1, thread_name_prefix="intake")
         self._room: asyncio.Semaphore | None = None
         self._tick_asked: float | None = None
         self._n_waiting = 0
@@ -85,6 +90,7 @@ class Studio:
         self._tasks: set[asyncio.Task] = set()
         self._pages: dict[str, Subscriber] = {}
         self.bricks = self._thread.submit(WireBricks, self.texture).result()
+        self._thread.submit(self.project.keep_house_apart).result()
         self.state: dict[str, Any] = {}
         self._state_key, self._is_news = (-1, -1), False
         self._refresh()
@@ -109,6 +115,20 @@ class Studio:
         self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs
     ) -> asyncio.Future[R]:
         """As `do`, but return once it is sure that it comes next, before it is done."""
+        return await self._submit(self._thread, self._run, function, *args, **kwargs)
+
+    async def ask_intake(
+        self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs
+    ) -> asyncio.Future[R]:
+        """As `ask`, on the intake, beside what the studio's thread does; `LiveStrokes.keep` may be.
+
+        Nothing tells which of two things comes first that are asked of different threads.
+        """
+        while self.live.n_waiting > MOST_UNPAINTED:
+            await self.do(self.live.paint)
+        return await self._submit(self._intake, self._take_in, function, *args, **kwargs)
+
+    async def _submit(self, thread: ThreadPoolExecutor, *work: Any, **kwargs: Any):
         if self._room is None:
             self._room = asyncio.Semaphore(MOST_WAITING)
             for client in self.live.open_clients():  # of a server that died
@@ -116,7 +136,7 @@ class Studio:
                     self._wait_for(client)
         await self._room.acquire()
         self._n_waiting += 1
-        asked = asyncio.wrap_future(self._thread.submit(self._run, function, *args, **kwargs))
+        asked = asyncio.wrap_future(thread.submit(*work, **kwargs))
         asked.add_done_callback(self._was_done)
         return asked
 
@@ -161,49 +181,60 @@ class Studio:
         same = (whose, last.kind, last.layer) == (client, operation.kind, operation.layer)
         return same and history.steps[-1].number == seq
 
-    async def subscribe(self, subscriber: Subscriber) -> None:
+    def subscribe(self, subscriber: Subscriber) -> None:
         """From now on tell this one what changes."""
-        await self.do(self._subscribers.append, subscriber)
+        self._subscribers.append(subscriber)
+        self._thread.submit(self._run, bool)  # so that all are told
 
-    async def unsubscribe(self, subscriber: Subscriber) -> None:
-        """Tell this one nothing more."""
-
-        def remove() -> None:
-            if subscriber in self._subscribers:
-                self._subscribers.remove(subscriber)
-
-        await self.do(remove)
+    def unsubscribe(self, subscriber: Subscriber) -> None:
+        """Tell this one nothing more; this does not wait for what is being done."""
+        if subscriber in self._subscribers:
+            self._subscribers.remove(subscriber)
+            self._thread.submit(self._run, bool)
 
     async def close(self) -> None:
-        """End open strokes, close the project and end the thread."""
+        """End open strokes, close the project and end the threads."""
+        await asyncio.get_running_loop().run_in_executor(None, self._intake.shutdown)
         await asyncio.wrap_future(self._thread.submit(self._close))
         self._thread.shutdown()
 
+    def look(self) -> None:
+        """On the studio's thread: let `bricks` be what is painted by now."""
+        self.live.paint()
+        self.bricks.update()
+
     def _run(self, function: Callable[..., R], *args: Any, **kwargs: Any) -> R:
         try:
+            self.live.paint()
             return function(*args, **kwargs)
         finally:
             self._refresh()
+            if not self._ask_for_tick() and time.monotonic() - self._tick_asked > TICK:
+                self._tick(is_last=False)
+
+    def _take_in(self, function: Callable[..., R], *args: Any, **kwargs: Any) -> R:
+        try:
+            return function(*args, **kwargs)
+        finally:
             self._ask_for_tick()
 
-    def _ask_for_tick(self) -> None:
-        """Tick after all that waits already, or now if that has lasted too long."""
-        now = time.monotonic()
-        if self._tick_asked is None:
-            self._tick_asked = now
-            self._thread.submit(self._tick)
-        elif now - self._tick_asked > TICK:
-            self._tick(is_last=False)
+    def _ask_for_tick(self) -> bool:
+        """Tick after all that waits already, unless that was asked for."""
+        if self._tick_asked is not None:
+            return False
+        self._tick_asked = time.monotonic()
+        self._thread.submit(self._tick)
+        return True
 
     def _tick(self, *, is_last: bool = True) -> None:
         self._tick_asked = None if is_last else time.monotonic()
         if self._is_news:
             self._is_news = False
-            for subscriber in self._subscribers:
+            for subscriber in tuple(self._subscribers):
                 subscriber.told_state(self.state)
         try:
-            self.bricks.update()
-            for subscriber in self._subscribers:
+            self.look()
+            for subscriber in tuple(self._subscribers):
                 subscriber.refill()
         except MeshsdfError as error:
             self.project.warn(f"pages could not be told what changed: {error.what}")

@@ -33,20 +33,20 @@ def unpack(blob: Blob, what: str) -> bytes:
         raise Damaged(f"{what} cannot be unpacked") from None
 
 
-def pack_all(keyed: Iterable[tuple], *, at_once: int = 512) -> Iterator[tuple]:
-    """``(key, data)`` to ``(key, Blob)``, on all cores and in order."""
+def pack_all(keyed: Iterable[tuple], *, at_once: int = 512, alone: bool = False) -> Iterator[tuple]:
+    """``(key, data)`` to ``(key, Blob)``, in order; on all cores but if ``alone``."""
     waiting: list[tuple] = []
     for one in keyed:
         waiting.append(one)
         if len(waiting) == at_once:
-            yield from _packed(waiting)
+            yield from _packed(waiting, 1 if alone else 8)
             waiting = []
-    yield from _packed(waiting)
+    yield from _packed(waiting, 1 if alone else 8)
 
 
-def _packed(items: list[tuple]) -> list[tuple]:
+def _packed(items: list[tuple], most: int) -> list[tuple]:
     out: list = [None] * len(items)
-    n_pieces = min(8, len(items))
+    n_pieces = min(most, len(items))
 
     def work(piece: int) -> None:
         for i in range(piece, len(items), n_pieces):

@@ -1,13 +1,11 @@
-"""Write what a texture's layers hold into a project's file, and read it back.
+"""Read what a texture's layers held from a project's file; `checkpoint_write` writes it.
 
-Only chunks that changed since the checkpoint before are written; a checkpoint is made of the
-latest row of every chunk up to its own operation. Rows that no kept checkpoint needs are removed.
+A checkpoint is made of the latest row of every chunk up to its own operation.
 """
 
 import hashlib
 import json
 import sqlite3
-import zlib
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,24 +14,14 @@ import numpy as np
 from ..kernels.brick_packing import unpack_bricks
 from ..kernels.parallel import run_pieces
 from ..kernels.texture_lookup import ABSENT, FIRST_TILE
-from .blobs import Damaged, pack, pack_all, unpack
-from .content import BRICK, CHUNK, Content, combined_digest, layer_codes, layer_list
+from .blobs import Damaged, unpack
+from .content import BRICK, CHUNK, combined_digest
 from .layer import Layer
 from .volume_texture import VolumeTexture
 
-KEPT = 2
 PIECES = 16
 
-PRUNE = """
-WITH latest AS (
-    SELECT rowid AS id, seq, LEAD(seq) OVER (
-        PARTITION BY layer, channel, chunk ORDER BY seq) AS next FROM brick)
-DELETE FROM brick WHERE rowid IN (
-    SELECT id FROM latest WHERE NOT EXISTS (
-        SELECT 1 FROM checkpoint AS c
-        WHERE c.seq >= latest.seq AND (latest.next IS NULL OR c.seq < latest.next)))
-"""
-FORGET_CHUNKS = """
+CHUNKS = """
 INSERT INTO brick
 SELECT DISTINCT layer, channel, chunk, :seq, 0, :crc, x'0000' FROM brick AS old
 WHERE layer = :layer AND NOT EXISTS (
@@ -64,50 +52,6 @@ class Loaded:
     tip: int
     layers: list[LoadedLayer]
     next_number: int
-
-
-def write_checkpoint(
-    connection: sqlite3.Connection, content: Content, seq: int, tip: int, origin: int
-) -> None:
-    """Keep what the texture holds after operation ``seq``, in one transaction.
-
-    ``tip`` is the latest step that is done; the checkpoint of ``origin`` is never removed.
-    """
-    before = content.state()
-    connection.execute("BEGIN IMMEDIATE")
-    try:
-        rows = (
-            (key.layer, key.channel, key.chunk, seq, *blob)
-            for key, blob in pack_all(content.update())
-        )
-        connection.executemany("INSERT OR REPLACE INTO brick VALUES (?, ?, ?, ?, ?, ?, ?)", rows)
-        texture = content.texture
-        for layer in texture.layers:
-            if layer.number not in before[0]:
-                # Another layer may have had its number, and rows, before that was undone
-                values = {"seq": seq, "layer": layer.number, "crc": zlib.crc32(b"\0\0")}
-                connection.execute(FORGET_CHUNKS, values)
-        connection.execute("DELETE FROM checkpoint WHERE seq = ?", (seq,))
-        connection.execute(
-            "INSERT INTO checkpoint VALUES (?, ?, ?, ?)",
-            (seq, tip, content.digest(), layer_list(texture)),
-        )
-        connection.executemany(
-            "INSERT INTO layer VALUES (?, ?, ?, ?, ?)",
-            [(seq, one.number, *pack(layer_codes(texture, one))) for one in texture.layers],
-        )
-        connection.execute(
-            "DELETE FROM checkpoint WHERE seq != ? AND seq NOT IN "
-            "(SELECT seq FROM checkpoint ORDER BY seq DESC LIMIT ?)",
-            (origin, KEPT),
-        )
-        connection.execute(PRUNE)
-        connection.execute("COMMIT")
-    except BaseException:
-        content.restore_state(before)
-        if connection.in_transaction:
-            connection.execute("ROLLBACK")
-        raise
 
 
 def load_checkpoint(connection: sqlite3.Connection, texture: VolumeTexture, seq: int) -> Loaded:

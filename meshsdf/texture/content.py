@@ -7,7 +7,7 @@ bricks are told by the layer's codes.
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from ..kernels.brick_packing import count_written, pack_bricks
 from ..kernels.texture_lookup import ABSENT, FIRST_TILE
 from .change import LayerState
-from .layer import Layer
+from .pool import Slots
 from .volume_texture import VolumeTexture
 
 CHUNK = 16
@@ -40,6 +40,83 @@ class _Known:
     digests: dict[tuple[str, int], bytes] = field(default_factory=dict)
 
 
+class Frozen:
+    """What the layers hold at one moment, whatever is done to them later.
+
+    The owner of the texture makes it and lets go of it; in between, any thread may read it.
+
+    Attributes
+    ----------
+    listed : str
+        The layers without their slots, see `layer_list`.
+    known : dict of int to _Known
+        By the layers' numbers; the digests are those of the moment once all of `chunks` were taken.
+    new : list of int
+        Layers that were not there when the one before was taken.
+    generation : int
+        Of the pool; slots that are taken later are of later ones.
+    """
+
+    def __init__(
+        self, texture: VolumeTexture, before: dict[int, _Known], since: int, slots_of: Mapping
+    ) -> None:
+        self.texture, self.listed = texture, layer_list(texture)
+        pool = texture.pool
+        self.generation = pool.generation
+        pool.begin_recording()
+        pool.end_recording()
+        self._channels = list(pool.arrays)
+        self._touched: dict[int, np.ndarray] = {}
+        self._held: list[Slots] = []
+        self.known: dict[int, _Known] = {}
+        self.new = [layer.number for layer in texture.layers if layer.number not in before]
+        for layer in texture.layers:
+            slots = slots_of.get(layer.number, layer.slots).copy()
+            old = before.get(layer.number) or _Known(np.full_like(slots, ABSENT))
+            touched, bricks = slots != old.slots, slots >= 0
+            touched[bricks] |= pool.born[slots[bricks]] > since
+            chunks = np.unique(np.flatnonzero(touched) // CHUNK)
+            self.known[layer.number] = _Known(slots, dict(old.digests))
+            self._touched[layer.number] = chunks
+            # What is held is never written
+            self._held.append(slots[_entries_of(chunks, len(slots))])
+            pool.hold(self._held[-1])
+
+    def chunks(self) -> Iterator[tuple[ChunkKey, bytes]]:
+        """Every chunk that is not as it was when the one before was taken, and its bytes."""
+        for number, now in self.known.items():
+            for key, data in self._packed(number, now.slots):
+                if len(data) > 2:
+                    now.digests[key.channel, key.chunk] = hashlib.sha256(data).digest()
+                elif now.digests.pop((key.channel, key.chunk), None) is None:
+                    continue
+                yield key, data
+
+    def codes(self) -> dict[int, bytes]:
+        """What is stored of every layer's entries, see `layer_codes`."""
+        return {number: layer_codes(self.texture, one.slots) for number, one in self.known.items()}
+
+    def digest(self, codes: dict[int, bytes]) -> str:
+        """SHA-256 of all of it, once all of `chunks` were taken."""
+        parts = [(codes[number], one.digests) for number, one in self.known.items()]
+        return combined_digest(self.listed, parts)
+
+    def release(self) -> None:
+        """Let go of it."""
+        for slots in self._held:
+            self.texture.pool.drop(slots)
+        self._held = []
+
+    def _packed(self, number: int, slots: Slots) -> Iterator[tuple[ChunkKey, bytes]]:
+        chunks = self._touched[number]
+        for channel in self._channels:
+            for first in range(0, len(chunks), CHUNKS_AT_ONCE):
+                part = chunks[first : first + CHUNKS_AT_ONCE]
+                packed = pack_chunks(self.texture, slots, channel, part)
+                for chunk, data in zip(part, packed, strict=True):
+                    yield ChunkKey(number, channel, int(chunk)), data
+
+
 class Content:
     """Follows what a texture holds, so that only what changed is packed and hashed again.
 
@@ -51,24 +128,31 @@ class Content:
         self._known: dict[int, _Known] = {}
         self._generation = -1
 
+    def freeze(self, slots_of: Mapping[int, Slots] | None = None) -> Frozen:
+        """What the layers hold now, beside what is known.
+
+        Parameters
+        ----------
+        slots_of : mapping of int to (e,) int32, optional
+            What stands for the slots of some layers; somebody holds them.
+        """
+        return Frozen(self.texture, self._known, self._generation, slots_of or {})
+
+    def know_frozen(self, frozen: Frozen) -> None:
+        """Take what was frozen, whose chunks were all taken, as known."""
+        self._known, self._generation = frozen.known, frozen.generation
+
     def update(self) -> Iterator[tuple[ChunkKey, bytes]]:
         """Yield every chunk that changed since the last update, and its bytes.
 
         The digest is that of now once all have been taken.
         """
-        texture = self.texture
-        known = {}
-        for layer in texture.layers:
-            old = self._known.get(layer.number) or _Known(np.full_like(layer.slots, ABSENT))
-            known[layer.number] = now = _Known(layer.slots.copy(), dict(old.digests))
-            for key, data in self._changed(layer, old):
-                if len(data) > 2:
-                    now.digests[key.channel, key.chunk] = hashlib.sha256(data).digest()
-                elif now.digests.pop((key.channel, key.chunk), None) is None:
-                    continue
-                yield key, data
-        self._known = known
-        self._generation = texture.pool.generation
+        frozen = self.freeze()
+        try:
+            yield from frozen.chunks()
+            self.know_frozen(frozen)
+        finally:
+            frozen.release()
 
     def know(self, digests: dict[int, dict[tuple[str, int], bytes]]) -> None:
         """Take what the layers hold now as known, with the digests of their chunks."""
@@ -82,31 +166,10 @@ class Content:
         """SHA-256 of all that the layers hold, as of the last update."""
         layers = self.texture.layers
         parts = [
-            (layer_codes(self.texture, layer), self._known[layer.number].digests)
+            (layer_codes(self.texture, layer.slots), self._known[layer.number].digests)
             for layer in layers
         ]
         return combined_digest(layer_list(self.texture), parts)
-
-    def state(self) -> tuple[dict[int, _Known], int]:
-        """What is known, for `restore_state` if an update came to nothing."""
-        return self._known, self._generation
-
-    def restore_state(self, state: tuple[dict[int, _Known], int]) -> None:
-        """Forget the updates since `state`."""
-        self._known, self._generation = state
-
-    def _changed(self, layer: Layer, old: _Known) -> Iterator[tuple[ChunkKey, bytes]]:
-        pool = self.texture.pool
-        touched = layer.slots != old.slots
-        bricks = layer.slots >= 0
-        touched[bricks] |= pool.born[layer.slots[bricks]] > self._generation
-        chunks = np.unique(np.flatnonzero(touched) // CHUNK)
-        for channel in pool.arrays:
-            for first in range(0, len(chunks), CHUNKS_AT_ONCE):
-                part = chunks[first : first + CHUNKS_AT_ONCE]
-                packed = pack_chunks(self.texture, layer, channel, part)
-                for chunk, data in zip(part, packed, strict=True):
-                    yield ChunkKey(layer.number, channel, int(chunk)), data
 
 
 def digest(texture: VolumeTexture) -> str:
@@ -136,9 +199,8 @@ def layer_list(texture: VolumeTexture) -> str:
     return json.dumps({"layers": layers, "next": texture._next_number}, sort_keys=True)
 
 
-def layer_codes(texture: VolumeTexture, layer: Layer) -> bytes:
+def layer_codes(texture: VolumeTexture, slots: Slots) -> bytes:
     """What is stored of every entry: ABSENT, BRICK, or a tile, numbered in order of appearance."""
-    slots = layer.slots
     is_tile = slots <= FIRST_TILE
     tiles, first, number = np.unique(slots[is_tile], return_index=True, return_inverse=True)
     order = np.argsort(first)
@@ -155,19 +217,18 @@ def layer_codes(texture: VolumeTexture, layer: Layer) -> bytes:
 
 
 def pack_chunks(
-    texture: VolumeTexture, layer: Layer, channel: str, chunks: np.ndarray
+    texture: VolumeTexture, slots: Slots, channel: str, chunks: np.ndarray
 ) -> list[bytes]:
     """The bytes of chunks; just an empty mask where nothing was written."""
     masks = texture.octree.tables.masks
     pool, nothing = texture.pool.arrays[channel], texture.channels[channel].nothing
-    entries = (CHUNK * chunks[:, None] + np.arange(CHUNK)).ravel()
-    entries = entries[entries < len(layer.slots)].astype(np.int32)
-    entries = entries[layer.slots[entries] >= 0]
+    entries = _entries_of(chunks, len(slots))
+    entries = entries[slots[entries] >= 0]
     counts = np.zeros(len(entries), np.int64)
-    count_written(masks, entries, layer.slots[entries], pool, pool.dtype.type(nothing), counts)
+    count_written(masks, entries, slots[entries], pool, pool.dtype.type(nothing), counts)
     entries, counts = entries[counts > 0], counts[counts > 0]
     packed = np.empty(counts.sum(), pool.dtype)
-    pack_bricks(masks, entries, layer.slots[entries], pool, packed)
+    pack_bricks(masks, entries, slots[entries], pool, packed)
     data = packed.astype(pool.dtype.newbyteorder("<"), copy=False).tobytes()
     ends = np.concatenate([[0], np.cumsum(counts)]) * pool.itemsize
     place = np.searchsorted(entries, CHUNK * chunks)
@@ -178,3 +239,9 @@ def pack_chunks(
         mask = int((1 << (entries[begin:end] % CHUNK)).sum())
         out.append(mask.to_bytes(2, "little") + data[ends[begin] : ends[end]])
     return out
+
+
+def _entries_of(chunks: np.ndarray, n_entries: int) -> np.ndarray:
+    """The entries of some chunks."""
+    entries = (CHUNK * chunks[:, None] + np.arange(CHUNK)).ravel()
+    return entries[entries < n_entries].astype(np.int32)

@@ -5,9 +5,10 @@ reading the last checkpoint and performing later operations again, which gives t
 operations are the document, texels are what they make.
 """
 
+import contextlib
 import os
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from ..mesh import Mesh
 from ..progress import Progress, silent
 from .blobs import Damaged
 from .change import Change, recording
-from .checkpoint import write_checkpoint
+from .checkpoints import Checkpoints
 from .content import Content, digest
 from .history import BUDGET, History, Step
 from .journal_log import (
@@ -28,9 +29,10 @@ from .journal_log import (
     steps_of,
 )
 from .journal_open import open_sound
-from .journal_schema import FAULTS, Statement, check_header, connect, copy_to
+from .journal_schema import FAULTS, Statement, Writer, check_header, connect, copy_to
 from .operations import TURNS, Operation, perform
 from .pending import PendingTable
+from .pool import Slots
 from .project_lock import ProjectLock
 from .project_parts import write_new
 from .replay import Replay
@@ -38,9 +40,6 @@ from .salvage import salvage
 from .volume_texture import VolumeTexture
 
 Warn = Callable[[str], None]
-
-OPERATIONS_PER_CHECKPOINT = 256
-BYTES_PER_CHECKPOINT = 64 * 2**20
 
 
 def unheard(message: str) -> None:
@@ -72,7 +71,7 @@ class Project:
     def __init__(
         self,
         path: Path,
-        connection: sqlite3.Connection,
+        connection: Writer,
         texture: VolumeTexture,
         origin: int = 0,
         *,
@@ -84,19 +83,18 @@ class Project:
         self.texture = texture
         self.history = History(texture, budget=budget)
         self._replay = Replay(connection, self.history, origin, warn)
-        self.history.rebuild = self._replay.rebuild
+        self.history.rebuild = self._rebuild
         self.last_seq = origin
         self.warn = warn
         self._connection = connection
         self._lock = lock
         self._origin = origin
-        self._content, self._digests = Content(texture), Content(texture)
+        self._checkpoints = Checkpoints(connection, self.history, origin, warn)
+        self._digests = Content(texture)
         self.seqs: dict[tuple[str, int], int] = {}
-        self._checkpoint_seq = -1
-        self._dirty_bytes = 0
         self._is_open = True
         self.painting: Any = None
-        self.pending = PendingTable(connection, lock)
+        self.pending = PendingTable(connection, path, lock)
 
     @classmethod
     def create(
@@ -249,7 +247,7 @@ class Project:
             self._push(operation, seq, change)
         self._done(seq, client, cseq)
         if operation.kind not in TURNS:  # undo and redo do not wait for a checkpoint
-            self.checkpoint_if_due()
+            self.keep_house()
         return seq
 
     def adopt(self, operation: Operation, change: Change, *, client: str, cseq: int) -> int:
@@ -263,10 +261,11 @@ class Project:
         self._require_open()
         seq = self.last_seq + 1
         row = op_row(seq, client, cseq, operation, not change.is_empty)
-        self._commit(row, lambda: change.undo(self.texture), self.pending.forget(client))
+        with self.pending.turn:
+            self._commit(row, lambda: change.undo(self.texture), self.pending.forget(client))
+            self.pending.forgotten(client)
+            self._done(seq, client, cseq)
         self._push(operation, seq, change)
-        self.pending.forgotten(client)
-        self._done(seq, client, cseq)
         return seq
 
     def undo(self) -> int:
@@ -278,14 +277,12 @@ class Project:
         return self.apply(Operation("redo"))
 
     def checkpoint(self) -> None:
-        """Keep what the layers hold now, so that opening need not perform operations again."""
+        """Keep what the layers hold now, so that opening need not perform operations again.
+
+        Strokes that are no operations yet are left out.
+        """
         self._require_open()
-        if self._checkpoint_seq == self.last_seq or self._is_painting:
-            return
-        history = self.history
-        tip = history.steps[history.n_done - 1].number if history.n_done else 0
-        write_checkpoint(self._connection, self._content, self.last_seq, tip, self._origin)
-        self._checkpoint_seq, self._dirty_bytes = self.last_seq, 0
+        self._checkpoints.write(self.last_seq, self._slots_below())
 
     def digest(self) -> str:
         """SHA-256 of all that the layers hold, wherever in memory it is."""
@@ -314,11 +311,29 @@ class Project:
             self.painting.set_aside()
         try:
             self.checkpoint()
-            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         finally:
             self._is_open = False
+            self._checkpoints.close()
+            self.pending.close()
+            with contextlib.suppress(sqlite3.Error):  # then the log stays, which is as good
+                self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             self._connection.close()
             self._lock.release()
+
+    def keep_house_apart(self) -> None:
+        """From now on a thread of its own writes checkpoints and shortens the log."""
+        self._checkpoints.write_apart(self.path, self.pending.writer)
+
+    def keep_house(self) -> None:
+        """Write a checkpoint if one is due; at once, or see that the thread does it."""
+        self._checkpoints.write_if_due(self.last_seq, self._slots_below())
+
+    def _rebuild(self, n_done: int) -> None:
+        self._checkpoints.settle()  # whose rows must not go while they are read
+        self._replay.rebuild(n_done)
+
+    def _slots_below(self) -> Mapping[int, Slots]:
+        return {} if self.painting is None else self.painting.slots_below()
 
     def _turn(self, operation: Operation, row: tuple) -> None:
         history = self.history
@@ -328,40 +343,26 @@ class Project:
         turn()
         self._commit(row, back)
         turned = history.n_done - (operation.kind == "redo")
-        self._dirty_bytes += history.steps[turned].n_bytes
+        self._checkpoints.n_bytes += history.steps[turned].n_bytes
 
     def _commit(self, row: tuple, take_back: Callable[[], object], *more: Statement) -> None:
         commit(self._connection, self.path, row, take_back, *more)
 
     def _push(self, operation: Operation, seq: int, change: Change) -> None:
-        self._dirty_bytes += change.n_bytes(self.texture)
+        self._checkpoints.n_bytes += change.n_bytes(self.texture)
         if not change.is_empty:
             self.history.push(operation.kind, seq, change)
 
     def _done(self, seq: int, client: str, cseq: int | None) -> None:
-        self.last_seq = seq
-        if cseq is not None:
-            self.seqs[client, cseq] = seq
-        self._lock.note(seq, self.pending.n_rows)
+        with self.pending.turn:
+            self.last_seq = seq
+            if cseq is not None:
+                self.seqs[client, cseq] = seq
+            self._lock.note(seq, self.pending.n_rows)
 
     @property
     def _is_painting(self) -> bool:
         return self.painting is not None and self.painting.is_painting
-
-    @property
-    def checkpoint_is_due(self) -> bool:
-        """Whether much came since the last checkpoint."""
-        n_operations = self.last_seq - max(self._checkpoint_seq, self._origin)
-        many = n_operations >= OPERATIONS_PER_CHECKPOINT
-        return many or self._dirty_bytes >= BYTES_PER_CHECKPOINT
-
-    def checkpoint_if_due(self) -> None:
-        """Write a checkpoint if one is due; ``warn`` is told if that fails."""
-        if self.checkpoint_is_due:
-            try:
-                self.checkpoint()
-            except sqlite3.Error as error:
-                self.warn(f"no checkpoint could be written to {self.path}: {error}")
 
     def _restore(self, entries: list[Entry]) -> None:
         """Bring the texture to the state after the last operation of the log."""
@@ -374,12 +375,11 @@ class Project:
         loaded = self._replay.load(n_done)
         if loaded is not None:
             digests = {one.attributes["number"]: one.digests for one in loaded.layers}
-            self._content.know(digests)
+            self._checkpoints.loaded(loaded)
             self._digests.know({number: dict(each) for number, each in digests.items()})
-        self._checkpoint_seq = loaded.seq if loaded else -1
         # What was passed over must not be taken for rows of the next checkpoint
         for table in ("checkpoint", "brick"):
-            self._connection.execute(f"DELETE FROM {table} WHERE seq > ?", (self._checkpoint_seq,))
+            self._connection.execute(f"DELETE FROM {table} WHERE seq > ?", (self._checkpoints.seq,))
         first = self._replay.perform_steps(loaded, n_done)
         if later & {step.number for step in self.history.steps[first:n_done]}:
             self.warn(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import TextureError
 from .blobs import Damaged
-from .journal_schema import FAULTS, Statement, in_one
+from .journal_schema import FAULTS, Statement, Writer, in_one
 from .operations import TURNS, Operation
 
 KERNEL_VERSION = 2
@@ -87,7 +87,7 @@ def steps_of(entries: list[Entry]) -> tuple[list[Entry], int]:
 
 
 def commit(
-    connection: sqlite3.Connection,
+    connection: Writer,
     path: Path,
     row: tuple,
     take_back: Callable[[], object],

@@ -5,9 +5,12 @@ the layers held after some of them. Strokes that are no operations yet have a ta
 which files of format version 1 lack and get when they are opened.
 """
 
+import contextlib
 import os
 import sqlite3
 import struct
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +22,12 @@ APPLICATION_ID = 0x4D544558  # "MTEX"
 FORMAT_VERSION = 2
 Statement = tuple[str, tuple]
 """SQL, and its values."""
+Turn = type(threading.RLock())
+"""A lock that its holder may take again."""
 
 MAGIC = b"SQLite format 3\0"
+FRAMES_PER_COPY = 1000  # pages, 4 MB
+LONGEST_LOG = 16 * 2**20  # bytes of the log's file, once all of it was copied
 FAULTS = (sqlite3.Error, UnicodeDecodeError)  # what reading a damaged database raises
 HEADER = 100  # bytes of a database's header
 WAL_MAGIC = 0x377F0682  # or one more, if checksums are big-endian
@@ -56,13 +63,35 @@ CREATE TABLE pending(
 """
 
 
-def connect(path: Path) -> sqlite3.Connection:
+class Writer(sqlite3.Connection):
+    """A connection to a project.
+
+    Attributes
+    ----------
+    turn : Turn
+        Held by whoever writes; the connections of one owner share it, so that they wait for one
+        another no longer than a transaction lasts.
+    """
+
+    turn: Turn
+
+    def copy_log_on_commit(self, does: bool) -> None:
+        """Whether a commit copies the log into the file when it has become long."""
+        self.execute(f"PRAGMA wal_autocheckpoint = {FRAMES_PER_COPY if does else 0}")
+
+
+def connect(path: Path, turn: Turn | None = None) -> Writer:
     """A connection that commits by itself, and whose commits are on the disk when they return."""
-    connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+    connection = sqlite3.connect(
+        path, isolation_level=None, check_same_thread=False, factory=Writer
+    )
+    connection.turn = threading.RLock() if turn is None else turn
     connection.execute("PRAGMA busy_timeout = 5000")
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")
     connection.execute("PRAGMA foreign_keys = ON")
+    connection.execute(f"PRAGMA journal_size_limit = {LONGEST_LOG}")
+    connection.copy_log_on_commit(True)
     return connection
 
 
@@ -76,7 +105,7 @@ def integrity(path: Path) -> str:
     return verdict
 
 
-def create(path: Path) -> sqlite3.Connection:
+def create(path: Path) -> Writer:
     """A new database with empty tables."""
     connection = connect(path)
     connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
@@ -85,24 +114,32 @@ def create(path: Path) -> sqlite3.Connection:
     return connection
 
 
-def upgrade(connection: sqlite3.Connection) -> None:
+def upgrade(connection: Writer) -> None:
     """Give a project of an earlier format what it lacks."""
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if version < FORMAT_VERSION:
         in_one(connection, (PENDING, ()), (f"PRAGMA user_version = {FORMAT_VERSION}", ()))
 
 
-def in_one(connection: sqlite3.Connection, *statements: Statement) -> None:
+@contextlib.contextmanager
+def transaction(connection: Writer) -> Iterator[None]:
+    """All that the body writes, or, if it raises, nothing."""
+    with connection.turn:
+        connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+            connection.execute("COMMIT")
+        except BaseException:
+            if connection.in_transaction:
+                connection.execute("ROLLBACK")
+            raise
+
+
+def in_one(connection: Writer, *statements: Statement) -> None:
     """Execute statements, all of them or, if one fails, none."""
-    connection.execute("BEGIN IMMEDIATE")
-    try:
+    with transaction(connection):
         for statement, values in statements:
             connection.execute(statement, values)
-        connection.execute("COMMIT")
-    except BaseException:
-        if connection.in_transaction:
-            connection.execute("ROLLBACK")
-        raise
 
 
 def copy_to(connection: sqlite3.Connection, path: Path) -> None:

@@ -1,8 +1,9 @@
 """Strokes that are painted while they are drawn, each batch of samples on the disk first.
 
-A stroke comes from its client in batches. Each is painted at once and kept in the project's file
-before it is acknowledged; at the end the whole stroke becomes one operation, whose texels are those
-that were painted. Whoever opens the project after its owner died finds the stroke again.
+A stroke comes from its client in batches. Each is kept in the project's file before it is
+acknowledged, and painted at once, or soon; at the end the whole stroke becomes one operation, whose
+texels are those that were painted. Whoever opens the project after its owner died finds the stroke
+again.
 """
 
 import contextlib
@@ -21,6 +22,7 @@ from .live_stroke import LiveStroke
 from .operation_kinds import layer_numbered
 from .operations import Operation
 from .pending import PendingStroke, add_row, begin_row, mark_row
+from .pool import Slots
 from .stroke_path import Normals
 
 
@@ -44,10 +46,13 @@ class LiveStrokes:
     the order of the journal, and opening the project gives the same bytes.
 
     A layer does not go while strokes are open on it.
+
+    `keep` may be called on one other thread while the owner's is at work.
     """
 
     def __init__(self, project: Project) -> None:
         self.project = project
+        self._turn = project.pending.turn  # held for what is told of strokes in memory and file
         self._strokes: dict[str, LiveStroke] = {}  # in the order in which they began
         self._last: dict[str, int] = {}
         self._early: dict[str, int] = {}  # operations of strokes whose clients did not end them
@@ -61,7 +66,7 @@ class LiveStrokes:
         project.painting = self
         for client, told in found.strokes.items():
             self._strokes[client] = LiveStroke(project.texture, told)
-        self._put_on()
+        self.paint()
 
     @classmethod
     def open(
@@ -78,6 +83,17 @@ class LiveStrokes:
     def is_painting(self) -> bool:
         """Whether texels of a stroke are on a layer that are no operation yet."""
         return any(stroke.is_painted for stroke in self._strokes.values())
+
+    @property
+    def n_waiting(self) -> int:
+        """Batches of strokes on their layers that `paint` has not painted yet; on any thread."""
+        strokes = list(self._strokes.values())
+        return sum(stroke.n_waiting for stroke in strokes if stroke.is_painted)
+
+    def slots_below(self) -> dict[int, Slots]:
+        """What layers with paint that is no operation yet would store without it."""
+        painted = [stroke for stroke in self._strokes.values() if stroke.is_painted]
+        return {stroke.layer: stroke.slots_below for stroke in painted}
 
     def last_cseq(self, client: str) -> int:
         """The highest number that is known of a client; 0 if it never sent anything."""
@@ -101,9 +117,11 @@ class LiveStrokes:
         if client in self._strokes:
             self._finish_or_warn(client)
         stroke = LiveStroke(self.project.texture, PendingStroke(layer, brush, cseq))
-        self.project.pending.replace(client, [begin_row(client, cseq, layer, stroke.brush)])
-        self._strokes[client], self._last[client] = stroke, cseq
-        self._put_on()
+        with self._turn:
+            row = begin_row(client, cseq, layer, stroke.brush)
+            self.project.pending.replace(client, [row])
+            self._strokes[client], self._last[client] = stroke, cseq
+        self.paint()
 
     def add(
         self,
@@ -128,19 +146,41 @@ class LiveStrokes:
             No stroke of the client is open, the samples make no sense, or they cannot be kept;
             then nothing has changed.
         """
-        if self._is_known(client, cseq):
-            return
-        stroke = self._stroke_of(client)
-        pressures = np.ones(len(points)) if pressures is None else pressures
-        samples = np.column_stack([points, normals, pressures])
-        before = stroke.cseq
-        stroke.add(cseq, samples)
-        try:
-            self.project.pending.append(add_row(client, cseq, samples))
-        except BaseException:
-            stroke.forget_last(before)
-            raise
-        self._last[client] = cseq
+        self.keep(client, cseq, points, normals, pressures)
+        self.paint()
+
+    def keep(
+        self,
+        client: str,
+        cseq: int,
+        points: Points,
+        normals: Normals,
+        pressures: Values | None = None,
+    ) -> None:
+        """As `add`, but not painted on return: `paint` does that, or what comes after."""
+        with self._turn:
+            if self._is_known(client, cseq):
+                return
+            stroke = self._stroke_of(client)
+            pressures = np.ones(len(points)) if pressures is None else pressures
+            samples = np.column_stack([points, normals, pressures])
+            row = add_row(client, cseq, samples)
+            stroke.add(cseq, samples, lambda: self.project.pending.append(row))
+            self._last[client] = cseq
+
+    def paint(self) -> None:
+        """Paint of every layer's strokes what has come of the first."""
+        taken = set()
+        for client, stroke in self._strokes.items():
+            if stroke.layer not in taken and stroke.has_layer:
+                taken.add(stroke.layer)
+                try:
+                    stroke.put_on()
+                except TextureError as error:
+                    if stroke.trouble != error.what:
+                        stroke.trouble = error.what
+                        words = f"the stroke of client {client!r} cannot be painted: {error.what}"
+                        self.project.warn(words)
 
     def end(self, client: str, cseq: int) -> int:
         """End a stroke; the number of the operation that it has become.
@@ -181,7 +221,7 @@ class LiveStrokes:
         cseq = self.last_cseq(client) if cseq is None else cseq
         if client in self._strokes:
             self._drop(client, cseq)
-            self._put_on()
+            self.paint()
         self._last[client] = cseq
 
     def apply(self, operation: Operation, *, client: str = "", cseq: int | None = None) -> int:
@@ -220,22 +260,11 @@ class LiveStrokes:
         return cseq <= self.last_cseq(client)
 
     def _stroke_of(self, client: str) -> LiveStroke:
-        if client not in self._strokes:
+        stroke = self._strokes.get(client)
+        if stroke is None or not stroke.is_open:
             what = f"client {client!r} has no stroke open"
             raise TextureError(what, "LiveStrokes", "begin one first")
-        return self._strokes[client]
-
-    def _put_on(self) -> None:
-        """Paint of every layer's strokes the first."""
-        taken = set()
-        for client, stroke in self._strokes.items():
-            if stroke.layer not in taken and stroke.has_layer:
-                taken.add(stroke.layer)
-                try:
-                    stroke.put_on()
-                except TextureError as error:
-                    words = f"the stroke of client {client!r} cannot be painted: {error.what}"
-                    self.project.warn(words)
+        return stroke
 
     @contextlib.contextmanager
     def _aside(self, strokes: list[LiveStroke]) -> Iterator[None]:
@@ -245,7 +274,7 @@ class LiveStrokes:
         try:
             yield
         finally:
-            self._put_on()
+            self.paint()
 
     def _finish_or_warn(self, client: str) -> None:
         """End a stroke; raises only if it stays open."""
@@ -258,38 +287,50 @@ class LiveStrokes:
 
     def _end(self, client: str, cseq: int) -> int:
         stroke, project = self._stroke_of(client), self.project
-        others = [
-            other
-            for other in self._strokes.values()
-            if other is not stroke and other.layer == stroke.layer and other.is_painted
-        ]
-        with self._aside(others):
-            try:
-                stroke.put_on()
-                change = stroke.end()
-            except TextureError:
-                self._drop(client, cseq)
-                raise
-            try:
-                seq = project.adopt(stroke.operation(), change, client=client, cseq=cseq)
-            except BaseException as error:
-                change.release(project.texture)
-                if not isinstance(error, TextureError):
-                    # Ctrl-C may come when the rows were gone already
-                    project.pending.replace(client, stroke.rows(client))
-                raise
-            del self._strokes[client]
-            self._last[client] = max(cseq, self._last[client])
-        if project.checkpoint_is_due:
-            with self._aside(list(self._strokes.values())):
-                project.checkpoint_if_due()
+        with self._closed(stroke):
+            others = [
+                other
+                for other in self._strokes.values()
+                if other is not stroke and other.layer == stroke.layer and other.is_painted
+            ]
+            with self._aside(others):
+                try:
+                    stroke.put_on()
+                    change = stroke.end()
+                except TextureError:
+                    self._drop(client, cseq)
+                    raise
+                try:
+                    seq = project.adopt(stroke.operation(), change, client=client, cseq=cseq)
+                except BaseException as error:
+                    change.release(project.texture)
+                    if not isinstance(error, TextureError):
+                        # Ctrl-C may come when the rows were gone already
+                        project.pending.replace(client, stroke.rows(client))
+                    raise
+                with self._turn:
+                    del self._strokes[client]
+                    self._last[client] = max(cseq, self._last[client])
+        project.keep_house()
         return seq
+
+    @contextlib.contextmanager
+    def _closed(self, stroke: LiveStroke) -> Iterator[None]:
+        """Meanwhile nothing more of a stroke is kept."""
+        with self._turn:
+            stroke.is_open = False
+        try:
+            yield
+        finally:
+            stroke.is_open = True
 
     def _drop(self, client: str, cseq: int) -> None:
         """Forget a stroke, but not its client's numbers."""
-        self.project.pending.replace(client, [mark_row(client, cseq)])
-        self._strokes.pop(client).take_off()
-        self._last[client] = max(cseq, self._last[client])
+        with self._turn:
+            self.project.pending.replace(client, [mark_row(client, cseq)])
+            stroke = self._strokes.pop(client)
+            self._last[client] = max(cseq, self._last[client])
+        stroke.take_off()
 
 
 def finish_pending(project: Project) -> None:

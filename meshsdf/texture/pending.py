@@ -12,13 +12,15 @@ import time
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float64
 
 from ..errors import TextureError
 from .brush import Brush
-from .journal_schema import FAULTS, Statement, in_one
+from .journal_schema import FAULTS, Statement, Writer, connect, in_one
 from .project_lock import ProjectLock
 
 Samples = Float64[np.ndarray, "n 7"]
@@ -66,13 +68,19 @@ class Pending:
 class PendingTable:
     """The rows of a project that is open.
 
+    They are written over a connection of their own, on any thread that has the turn; so they do
+    not wait for what the project's owner reads.
+
     Attributes
     ----------
     n_rows : int
+    turn : Turn
+        To be held while the rows are written and what is known of them.
     """
 
-    def __init__(self, connection: sqlite3.Connection, lock: ProjectLock) -> None:
-        self._connection, self._lock = connection, lock
+    def __init__(self, connection: Writer, path: Path, lock: ProjectLock) -> None:
+        self._connection, self._path, self._lock = connection, path, lock
+        self.turn = connection.turn
         rows = connection.execute("SELECT client, COUNT(*) FROM pending GROUP BY client")
         self._counts: dict[str, int] = dict(rows.fetchall())
 
@@ -85,6 +93,17 @@ class PendingTable:
         """What they tell."""
         return read_pending(self._connection)
 
+    @cached_property
+    def writer(self) -> Writer:
+        """The connection for writing."""
+        return connect(self._path, self.turn)
+
+    def close(self) -> None:
+        """Nothing more will be written."""
+        if "writer" in vars(self):
+            self.writer.close()
+            del self.writer
+
     def append(self, row: tuple) -> None:
         """Write a row; it is on the disk on return.
 
@@ -93,20 +112,22 @@ class PendingTable:
         TextureError
             It cannot be written.
         """
-        self._write((INSERT, row))
-        self._counts[row[0]] = self._counts.get(row[0], 0) + 1
-        self._lock.note(self._lock.seq, self.n_rows)
+        with self.turn:
+            self._write((INSERT, row))
+            self._counts[row[0]] = self._counts.get(row[0], 0) + 1
+            self._lock.note(self._lock.seq, self.n_rows)
 
     def replace(self, client: str, rows: list[tuple]) -> None:
         """Write rows in the place of all that a client has; errors as `append`."""
-        before = self._counts.pop(client, 0)
-        self._lock.note(self._lock.seq, self.n_rows)  # too few for a moment is no damage
-        try:
-            self._write(self.forget(client), *((INSERT, row) for row in rows))
-            before = len(rows)
-        finally:
-            self._counts[client] = before
-            self._lock.note(self._lock.seq, self.n_rows)
+        with self.turn:
+            before = self._counts.pop(client, 0)
+            self._lock.note(self._lock.seq, self.n_rows)  # too few for a moment is no damage
+            try:
+                self._write(self.forget(client), *((INSERT, row) for row in rows))
+                before = len(rows)
+            finally:
+                self._counts[client] = before
+                self._lock.note(self._lock.seq, self.n_rows)
 
     def forget(self, client: str) -> Statement:
         """What deletes a client's rows; `forgotten` is to be called when it was executed."""
@@ -118,7 +139,7 @@ class PendingTable:
 
     def _write(self, *statements: Statement) -> None:
         try:
-            in_one(self._connection, *statements)
+            in_one(self.writer, *statements)
         except sqlite3.Error as error:
             what = f"a stroke could not be kept: {error}"
             fix = "free some space, or save the project elsewhere; then do it again"

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .blobs import Damaged
-from .checkpoint import install, load_checkpoint, write_checkpoint
+from .checkpoint import install, load_checkpoint
+from .checkpoint_write import write_checkpoint
 from .content import Content
 from .journal_log import COLUMNS, Entry, read_row, steps_of
 from .journal_schema import FAULTS, create
@@ -81,7 +82,7 @@ def _copy(source: sqlite3.Connection, new: Path, warn: Callable[[str], None]) ->
         target.executemany(INSERT_PENDING, pending.rows)
         target.execute("COMMIT")
         if checkpoint is not None:
-            write_checkpoint(target, Content(texture), *checkpoint, origin)
+            write_checkpoint(target, Content(texture).freeze(), *checkpoint, origin)
         target.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
 

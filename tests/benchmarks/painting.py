@@ -9,7 +9,7 @@ python -m tests.benchmarks.painting slow MESH [--seconds 60]
 latency  from sending a dab (60 per second, radius 25 texels) to its acknowledgement, which comes
          after the commit; also strokes' ends.
 soak     the same for ten minutes; how much the server's memory grows, and the last minute beside
-         the first.
+         the first, and all between.
 storm    a painter whose connection is cut every 200 ms, beside the same strokes without cuts.
 two      two painters at once: what each was sent, and the server's own, by their SHA-256.
 slow     a page that reads a megabit per second while another paints: the server's memory.
@@ -25,9 +25,11 @@ import sys
 import tempfile
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 
 import numpy as np
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from meshsdf import read_mesh
@@ -111,6 +113,10 @@ def brush_of(painter, color):
     return Brush(RADIUS * painter.facts["texel"], color=color, hardness=0.5)
 
 
+class Broken(Exception):
+    """The server's connection is gone, and with it what was to be measured."""
+
+
 class Timed:
     """A page that paints at a steady pace and notes when acknowledgements come.
 
@@ -150,34 +156,44 @@ class Timed:
             when += PAUSE
 
     def paint(self):
-        """Send everything at its time; returns when the last is acknowledged."""
+        """Send everything at its time, until the last is acknowledged; `Broken` if one is not."""
         opened = connect(
             self.url, additional_headers=self.headers, compression=None, max_size=2**26, proxy=None
         )
         with opened as socket:
             socket.send(encode_hello(Hello(os.urandom(16).hex())))
-            thread = threading.Thread(target=self._listen, args=(socket,))
-            thread.start()
-            time.sleep(1)
-            begin = time.perf_counter()
-            for n, (_, when, frame) in enumerate(self.frames):
-                time.sleep(max(0.0, begin + when - time.perf_counter()))
-                self.sent[n] = time.perf_counter()
-                socket.send(frame)
-            thread.join()
+            with ThreadPoolExecutor(1) as pool:
+                listening = pool.submit(self._listen, socket)
+                time.sleep(1)
+                begin = time.perf_counter()
+                for n, (_, when, frame) in enumerate(self.frames):
+                    time.sleep(max(0.0, begin + when - time.perf_counter()))
+                    self.sent[n] = time.perf_counter()
+                    try:
+                        socket.send(frame)
+                    except ConnectionClosed:
+                        break
+                listening.result()
 
     def _listen(self, socket):
+        """Note when acknowledgements come."""
         n_told = 0
-        while n_told < len(self.frames):
-            data = socket.recv()
-            now = time.perf_counter()
-            if data[0] == Type.ACK:
-                self.told[int.from_bytes(data[4:8], "little") - 1] = now
-                n_told += 1
-            elif data[0] == Type.BRICKS:
-                socket.send(encode(Type.SHOWN, int.from_bytes(data[4:8], "little")))
-            elif data[0] == Type.ERROR:
-                raise AssertionError(decode(data, downward=True).body)
+        try:
+            while n_told < len(self.frames):
+                n_told += self._take(socket, socket.recv())
+        except ConnectionClosed as error:
+            words = f"the connection broke after {n_told} of {len(self.frames)} answers"
+            raise Broken(f"{words}: {error}") from None
+
+    def _take(self, socket, data):
+        """Whether it is an acknowledgement."""
+        if data[0] == Type.ACK:
+            self.told[int.from_bytes(data[4:8], "little") - 1] = time.perf_counter()
+        elif data[0] == Type.BRICKS:
+            socket.send(encode(Type.SHOWN, int.from_bytes(data[4:8], "little")))
+        elif data[0] == Type.ERROR:
+            raise Broken(decode(data, downward=True).body)
+        return data[0] == Type.ACK
 
     def waits(self, kind, first=0.0, last=np.inf):
         """Milliseconds from sending to acknowledgement, of those sent in a time of the run."""
@@ -212,16 +228,20 @@ def soak(mesh_path, mesh, seconds):
             warm, timed = Timed(painter, mesh, 10, seed=1), Timed(painter, mesh, seconds)
         warm.paint()
         sizes, begin = [], time.perf_counter()
-        thread = threading.Thread(target=timed.paint)
-        thread.start()
-        while thread.is_alive():
-            sizes.append((time.perf_counter() - begin, server.resident))
-            thread.join(5)
+        with ThreadPoolExecutor(1) as pool:
+            painting = pool.submit(timed.paint)
+            while not painting.done():
+                sizes.append((time.perf_counter() - begin, server.resident))
+                wait([painting], 5)
+            painting.result()
         for at, size in sizes[:: max(1, len(sizes) // 12)]:
             print(f"{at:6.0f} s  {size / 2**20:7.1f} MiB")
         part = min(60.0, seconds / 4)
         print(f"dabs in the first {part:.0f} s: {in_words(timed.waits('dab', 0, part))}")
         print(f"dabs in the last: {in_words(timed.waits('dab', seconds - part))}")
+        parts = [timed.waits("dab", at, at + part) for at in np.arange(0, seconds, part)]
+        highs = " ".join(f"{np.percentile(one, 99):.1f}" for one in parts if len(one))
+        print(f"99 %, every {part:.0f} s: {highs} ms")
         middle = next(size for at, size in sizes if at >= seconds / 4)
         print(f"memory from a quarter on: {100 * (sizes[-1][1] / middle - 1):+.1f} %")
 
@@ -364,7 +384,10 @@ def main():
     mesh = read_mesh(asked.mesh)
     print(machine())
     print(f"{asked.what}: {asked.mesh.name}, {mesh.n_faces} faces, area {area(mesh):.4g}")
-    function(asked.mesh, mesh, asked.seconds or usual)
+    try:
+        function(asked.mesh, mesh, asked.seconds or usual)
+    except Broken as error:
+        sys.exit(f"nothing was measured: {error}")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ appends ``cseq seq`` to the file ACKNOWLEDGED after each.
 
 import os
 
-from meshsdf.texture import journal
+from meshsdf.texture import checkpoints
 from meshsdf.texture.journal import Project
 
 from .forking import fork_on_demand
@@ -36,7 +36,7 @@ def write(project_path: str, acknowledged_path: str, seed: str) -> None:
 
 def main() -> None:
     """Warm up, then fork on demand."""
-    journal.OPERATIONS_PER_CHECKPOINT = OPERATIONS_PER_CHECKPOINT
+    checkpoints.OPERATIONS_PER_CHECKPOINT = OPERATIONS_PER_CHECKPOINT
     warm_up()
     fork_on_demand(write)
 

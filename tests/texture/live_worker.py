@@ -10,7 +10,7 @@ import tempfile
 
 import numpy as np
 
-from meshsdf.texture import journal
+from meshsdf.texture import checkpoints
 from meshsdf.texture.brush import Brush
 from meshsdf.texture.journal import Project
 from meshsdf.texture.live import LiveStrokes
@@ -77,7 +77,7 @@ def write(project_path, acknowledged_path, seed):
 
 def main():
     """Warm up, then fork on demand."""
-    journal.OPERATIONS_PER_CHECKPOINT = OPERATIONS_PER_CHECKPOINT
+    checkpoints.OPERATIONS_PER_CHECKPOINT = OPERATIONS_PER_CHECKPOINT
     with tempfile.TemporaryDirectory() as folder:
         create(f"{folder}/warm.mtex")
         live = LiveStrokes.open(f"{folder}/warm.mtex")

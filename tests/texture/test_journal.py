@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from meshsdf.errors import TextureError
-from meshsdf.texture import journal
+from meshsdf.texture import checkpoints, journal
 from meshsdf.texture.brush import Brush
 from meshsdf.texture.journal import Project
 from meshsdf.texture.operations import KINDS, Operation
@@ -141,7 +141,7 @@ def test_an_operation_that_cannot_be_kept_is_taken_back(tmp_path):
 
 
 def test_undo_reaches_back_beyond_memory_and_checkpoints(tmp_path, monkeypatch):
-    monkeypatch.setattr(journal, "OPERATIONS_PER_CHECKPOINT", 8)
+    monkeypatch.setattr(checkpoints, "OPERATIONS_PER_CHECKPOINT", 8)
     digests = []
     with fresh(tmp_path, budget=20_000) as project:
         project.apply(Operation("add-layer"))
@@ -176,15 +176,15 @@ def test_layers_keep_their_identity_through_rebuilding(tmp_path):
 
 
 def test_at_least_two_checkpoints_are_kept_and_no_brick_that_none_needs(tmp_path, monkeypatch):
-    monkeypatch.setattr(journal, "OPERATIONS_PER_CHECKPOINT", 5)
+    monkeypatch.setattr(checkpoints, "OPERATIONS_PER_CHECKPOINT", 5)
     with fresh(tmp_path) as project:
         project.apply(Operation("add-layer"))
         for n in range(50):
             project.apply(ball(0.01 * n))
         query = project._connection.execute
-        checkpoints = query("SELECT seq FROM checkpoint").fetchall()
-        assert len(checkpoints) == 2
-        older = query("SELECT COUNT(*) FROM brick WHERE seq < ?", min(checkpoints)).fetchone()
+        kept = query("SELECT seq FROM checkpoint").fetchall()
+        assert len(kept) == 2
+        older = query("SELECT COUNT(*) FROM brick WHERE seq < ?", min(kept)).fetchone()
         newer = query("SELECT COUNT(DISTINCT layer || channel || chunk) FROM brick").fetchone()
         assert older <= newer
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshsdf.errors import TextureError
-from meshsdf.texture import journal, stroke_path
+from meshsdf.texture import checkpoints, stroke_path
 from meshsdf.texture.brush import Brush
 from meshsdf.texture.content import digest as digest_of
 from meshsdf.texture.journal import Project
@@ -218,13 +218,14 @@ def test_a_cancelled_stroke_was_never_there_but_its_numbers_stay_known(tmp_path)
 
 def test_a_batch_that_cannot_be_kept_is_taken_back(tmp_path):
     live = fresh(tmp_path)
-    connection = live.project._connection
+    writers = live.project._connection, live.project.pending.writer
     rng = np.random.default_rng(5)
     live.begin(ANNE, 1, 0, BRUSHES["smudge"])
     live.add(ANNE, 2, *walk(rng, 4))
     live.begin(BERT, 1, 0, BRUSHES["dabs"])
     shown, samples = live.project.digest(), walk(rng, 4)
-    connection.execute("PRAGMA query_only = ON")
+    for writer in writers:
+        writer.execute("PRAGMA query_only = ON")
     for client in (ANNE, BERT):
         with pytest.raises(TextureError, match="a stroke could not be kept"):
             live.add(client, 3, *samples)
@@ -239,7 +240,8 @@ def test_a_batch_that_cannot_be_kept_is_taken_back(tmp_path):
         live.begin(CARL, 1, 1, BRUSHES["band"])
     assert live.open_clients() == [ANNE, BERT]
     assert [live.last_cseq(client) for client in CLIENTS] == [2, 1, 0]
-    connection.execute("PRAGMA query_only = OFF")
+    for writer in writers:
+        writer.execute("PRAGMA query_only = OFF")
     for client in (ANNE, BERT):
         live.add(client, 3, *samples)
         live.end(client, 4)
@@ -319,7 +321,7 @@ def test_the_digest_is_of_now_even_if_bricks_are_used_again(tmp_path):
 
 
 def test_checkpoints_hold_no_stroke_that_is_still_painted(tmp_path, monkeypatch):
-    monkeypatch.setattr(journal, "OPERATIONS_PER_CHECKPOINT", 3)
+    monkeypatch.setattr(checkpoints, "OPERATIONS_PER_CHECKPOINT", 3)
     live = fresh(tmp_path)
     rng = np.random.default_rng(8)
     live.begin(ANNE, 1, 0, BRUSHES["band"])
@@ -333,7 +335,7 @@ def test_checkpoints_hold_no_stroke_that_is_still_painted(tmp_path, monkeypatch)
     digest = live.project.digest()
     live.close()
     again = LiveStrokes.open(path)
-    assert again.project._checkpoint_seq > 4 + 3  # there were some
+    assert again.project._checkpoints.seq > 4 + 3  # there were some
     again.end(ANNE, 100)
     assert again.project.digest() == digest
     again.close()
