@@ -30,7 +30,9 @@ def serving(live, images=None, **options):
         return JSONResponse(await studio.do(digests))
 
     async def socket(websocket):
-        with contextlib.suppress(WebSocketDisconnect, OSError):  # it went in the middle of a word
+        with contextlib.suppress(
+            WebSocketDisconnect, OSError, RuntimeError
+        ):  # it went in the middle of a word
             await serve_socket(websocket, studio, images)
 
     routes = [

@@ -357,7 +357,8 @@ def test_altered_frames_in_the_middle_of_a_session_do_not_stop_the_server(served
     with Painter(served[0]) as painter:
         painter.operation("add-layer", name="after all")
         painter.catch_up()
-        assert painter.state["layers"][-1]["name"] == "after all"
+        # What the others sent before they went may still come after it
+        assert "after all" in [layer["name"] for layer in painter.state["layers"]]
 
 
 def test_without_websockets_a_painter_says_what_to_install(monkeypatch):
