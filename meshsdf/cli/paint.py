@@ -2,6 +2,7 @@
 
 import os
 import webbrowser
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -62,7 +63,8 @@ def command(mesh: str, project: str | None, resolution, port, opens: bool, allow
     from ..server.security import LOOPBACK
     from ..server.static_page import has_page
 
-    live, loaded = _opened(console, mesh, project, resolution)
+    with _warming_up(console):
+        live, loaded = _opened(console, mesh, project, resolution)
     if not has_page():
         console.warn(f"the painting page is not here; this command adds it: {COMMAND}")
     if allow_remote:
@@ -73,6 +75,24 @@ def command(mesh: str, project: str | None, resolution, port, opens: bool, allow
     n_steps = plural(live.project.last_seq, "step")
     console.say(f"{live.project.path}: closed, with {n_steps}")
     return YES
+
+
+@contextmanager
+def _warming_up(console: Console):
+    """Beside the body, load what strokes need, and leave when both are done.
+
+    On a new machine that is compiled here, not when the first stroke comes.
+    """
+    from ..errors import MeshsdfError
+    from ..server.warm_up import warm_up
+
+    with ThreadPoolExecutor(1) as thread:
+        warmed = thread.submit(warm_up)
+        yield
+        try:
+            warmed.result()
+        except (MeshsdfError, OSError) as error:
+            console.warn(f"the first strokes may be slow: {error}")
 
 
 def check_extra() -> None:
