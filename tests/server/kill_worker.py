@@ -4,7 +4,7 @@ A line is a project; a server is what `meshsdf paint` runs, and prints its addre
 """
 
 from meshsdf.server.paint import paint
-from meshsdf.texture import checkpoints
+from meshsdf.texture import checkpoints, housekeeping
 from meshsdf.texture.live import LiveStrokes
 from tests.texture.forking import fork_on_demand
 from tests.texture.kill_worker import OPERATIONS_PER_CHECKPOINT, warm_up
@@ -19,6 +19,7 @@ def serve(project):
 def main():
     """Warm up, then fork on demand."""
     checkpoints.OPERATIONS_PER_CHECKPOINT = OPERATIONS_PER_CHECKPOINT
+    housekeeping.COPY_SECONDS = 0.02
     warm_up()
     fork_on_demand(serve)
 

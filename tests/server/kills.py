@@ -112,6 +112,15 @@ class Script:
         self.asked[cseq] = what
 
 
+@contextlib.contextmanager
+def reading(path):
+    """Look at a project that is open: its log stays meanwhile, so that it can be copied."""
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        connection.execute("BEGIN")
+        connection.execute("SELECT 1 FROM project").fetchall()
+        yield
+
+
 class Trial:
     """One project, whose servers are killed again and again, and the client that paints on it."""
 
@@ -140,7 +149,8 @@ class Trial:
         self.script.finish(painter)
         painter.catch_up()
         wanted = painter.get_json("/api/digest")["project"]
-        copy = copied(self.path, self.folder / "copy")
+        with reading(self.path):
+            copy = copied(self.path, self.folder / "copy")
         words = []
         with Project.open(copy, warn=words.append) as project:
             assert project.digest() == wanted, "the texels differ"

@@ -16,7 +16,7 @@ from meshsdf.server.app import Service, make_app
 from meshsdf.server.exports import Exports
 from meshsdf.server.images import Images
 from meshsdf.server.security import Gate
-from meshsdf.server.serve import listen, serve, server_of
+from meshsdf.server.serve import PaintServer, listen, serve, server_of
 from meshsdf.server.studio import Studio
 from meshsdf.texture.journal import Project
 from meshsdf.texture.live import LiveStrokes
@@ -34,6 +34,7 @@ class Running:
     studio: Studio
     service: Service
     folder: Path
+    server: PaintServer
 
     @property
     def base(self) -> str:
@@ -84,7 +85,7 @@ def running(folder: Path, static: Path | None = None) -> Iterator[Running]:
     thread.start()
     try:
         assert ready.wait(30)
-        yield Running(gate, studio, service, folder)
+        yield Running(gate, studio, service, folder, server)
     finally:
         server.should_exit = True
         thread.join(30)

@@ -1,7 +1,9 @@
 """The whole server's doors: who is let in, on HTTP and on the WebSocket."""
 
 import json
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 import pytest
@@ -113,3 +115,29 @@ def test_a_socket_stays_open_longer_than_requests_may_take(server, monkeypatch):
         socket.send(encode(Type.UNDO, 1))
         while decode(socket.recv(timeout=5), downward=True).type not in (Type.ACK, Type.ERROR):
             pass
+
+
+def test_a_server_that_ends_while_much_waits_ends_soon_and_without_a_fault(
+    tmp_path, monkeypatch, caplog
+):
+    monkeypatch.setattr(serve, "LAST_SECONDS", 0.3)
+    gate = threading.Event()
+    threading.Timer(2.0, gate.set).start()
+    with (
+        caplog.at_level("ERROR"),
+        ThreadPoolExecutor(1) as pool,
+        running(tmp_path) as ending,
+        knock(ending, **ending.bearer) as socket,
+        ending.client() as client,
+    ):
+        socket.send(encode_hello(Hello("1" * 32)))
+        assert decode(socket.recv(timeout=10), downward=True).type is Type.WELCOME
+        ending.studio._thread.submit(gate.wait)
+        for cseq in range(1, 40):
+            socket.send(encode(Type.UNDO, cseq))
+        asked = pool.submit(client.get, "/api/digest")
+        time.sleep(0.3)
+        ending.server.should_exit = True
+        assert asked.result(10).status_code == 503
+    assert gate.is_set()  # what was begun is done
+    assert not [one for one in caplog.records if one.exc_info or "ASGI" in one.getMessage()]

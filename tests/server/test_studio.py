@@ -61,6 +61,57 @@ def test_what_is_asked_is_done_in_order_on_one_other_thread(tmp_path):
     asyncio.run(main())
 
 
+def test_samples_are_taken_in_while_the_studio_is_busy_and_are_painted_by_whatever_comes_next(
+    tmp_path,
+):
+    async def main():
+        studio = studio_of(tmp_path)
+        live, gate = studio.live, threading.Event()
+        await studio.do(live.begin, "a", 1, 0, Brush(0.2))
+        before = await studio.do(studio.project.digest)
+        busy = await studio.ask(gate.wait)
+        for number in range(20):
+            await (await studio.ask_intake(live.keep, "a", 2 + number, UP, UP))
+        assert live.last_cseq("a") == 21
+        assert live.n_waiting == 20
+        assert not busy.done()
+        gate.set()
+        assert await studio.do(studio.project.digest) != before
+        assert live.n_waiting == 0
+        refused = await studio.ask_intake(live.keep, "b", 1, UP, UP)
+        with pytest.raises(TextureError, match="no stroke open"):
+            await refused
+        await studio.close()
+
+    asyncio.run(main())
+
+
+def test_samples_wait_when_too_many_are_not_painted_yet(tmp_path, monkeypatch):
+    monkeypatch.setattr(studio_module, "MOST_UNPAINTED", 8)
+
+    async def main():
+        studio = studio_of(tmp_path)
+        live, gate = studio.live, threading.Event()
+        await studio.do(live.begin, "a", 1, 0, Brush(0.2))
+        busy = await studio.ask(gate.wait)
+
+        async def send():
+            for number in range(30):
+                await (await studio.ask_intake(live.keep, "a", 2 + number, UP, UP))
+
+        sending = asyncio.create_task(send())
+        await asyncio.wait([sending], timeout=0.5)
+        assert not sending.done()
+        assert live.last_cseq("a") == 10
+        gate.set()
+        await sending
+        assert live.last_cseq("a") == 31
+        await busy
+        await studio.close()
+
+    asyncio.run(main())
+
+
 def test_what_is_asked_beyond_the_room_waits(tmp_path):
     async def main():
         studio = studio_of(tmp_path)

@@ -10,7 +10,7 @@ import tempfile
 
 import numpy as np
 
-from meshsdf.texture import checkpoints
+from meshsdf.texture import checkpoints, housekeeping
 from meshsdf.texture.brush import Brush
 from meshsdf.texture.journal import Project
 from meshsdf.texture.live import LiveStrokes
@@ -68,6 +68,8 @@ def write(project_path, acknowledged_path, seed):
     live = LiveStrokes.open(
         project_path, warn=lambda words: os.write(file, f"! {words}\n".encode())
     )
+    if n_acknowledged % 2:
+        live.project.keep_house_apart()
     for number in range(max(1, n_acknowledged - 3), n_acknowledged + MOST_MESSAGES):
         send(live, int(seed), number)
         if number > n_acknowledged:
@@ -78,6 +80,7 @@ def write(project_path, acknowledged_path, seed):
 def main():
     """Warm up, then fork on demand."""
     checkpoints.OPERATIONS_PER_CHECKPOINT = OPERATIONS_PER_CHECKPOINT
+    housekeeping.COPY_SECONDS = 0.0
     with tempfile.TemporaryDirectory() as folder:
         create(f"{folder}/warm.mtex")
         live = LiveStrokes.open(f"{folder}/warm.mtex")
