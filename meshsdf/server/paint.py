@@ -20,7 +20,7 @@ from .serve import listen, serve, server_of
 from .studio import Studio
 
 USUAL_PORT = 8757  # of no service that IANA's registry names
-SWITCH_SECONDS = 0.0005  # a thread that computes lets others go on so often
+SWITCH_SECONDS = 0.0002  # a thread that computes lets others go on so often
 UNSEEN = ("192.0.2.1", "2001:db8::1")  # addresses that nobody has (RFC 5737, RFC 3849)
 
 

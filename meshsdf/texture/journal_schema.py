@@ -137,6 +137,10 @@ def transaction(connection: Writer) -> Iterator[None]:
 
 def in_one(connection: Writer, *statements: Statement) -> None:
     """Execute statements, all of them or, if one fails, none."""
+    if len(statements) == 1:  # is a transaction already; every call waits for the interpreter
+        with connection.turn:
+            connection.execute(*statements[0])
+        return
     with transaction(connection):
         for statement, values in statements:
             connection.execute(statement, values)

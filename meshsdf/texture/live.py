@@ -81,14 +81,13 @@ class LiveStrokes:
 
     @property
     def is_painting(self) -> bool:
-        """Whether texels of a stroke are on a layer that are no operation yet."""
-        return any(stroke.is_painted for stroke in self._strokes.values())
+        """Whether texels may be on a layer that are no operation yet."""
+        return bool(self._strokes)
 
     @property
     def n_waiting(self) -> int:
-        """Batches of strokes on their layers that `paint` has not painted yet; on any thread."""
-        strokes = list(self._strokes.values())
-        return sum(stroke.n_waiting for stroke in strokes if stroke.is_painted)
+        """Batches that `paint` would paint; on any thread."""
+        return sum(stroke.n_waiting for _, stroke in self._of_layers() if not stroke.trouble)
 
     def slots_below(self) -> dict[int, Slots]:
         """What layers with paint that is no operation yet would store without it."""
@@ -121,7 +120,6 @@ class LiveStrokes:
             row = begin_row(client, cseq, layer, stroke.brush)
             self.project.pending.replace(client, [row])
             self._strokes[client], self._last[client] = stroke, cseq
-        self.paint()
 
     def add(
         self,
@@ -170,17 +168,14 @@ class LiveStrokes:
 
     def paint(self) -> None:
         """Paint of every layer's strokes what has come of the first."""
-        taken = set()
-        for client, stroke in self._strokes.items():
-            if stroke.layer not in taken and stroke.has_layer:
-                taken.add(stroke.layer)
-                try:
-                    stroke.put_on()
-                except TextureError as error:
-                    if stroke.trouble != error.what:
-                        stroke.trouble = error.what
-                        words = f"the stroke of client {client!r} cannot be painted: {error.what}"
-                        self.project.warn(words)
+        for client, stroke in self._of_layers():
+            try:
+                stroke.put_on()
+            except TextureError as error:
+                if stroke.trouble != error.what:
+                    stroke.trouble = error.what
+                    words = f"the stroke of client {client!r} cannot be painted: {error.what}"
+                    self.project.warn(words)
 
     def end(self, client: str, cseq: int) -> int:
         """End a stroke; the number of the operation that it has become.
@@ -265,6 +260,14 @@ class LiveStrokes:
             what = f"client {client!r} has no stroke open"
             raise TextureError(what, "LiveStrokes", "begin one first")
         return stroke
+
+    def _of_layers(self) -> list[tuple[str, LiveStroke]]:
+        """Of every layer's strokes the first, and whose it is."""
+        first: dict[int, tuple[str, LiveStroke]] = {}
+        for client, stroke in list(self._strokes.items()):
+            if stroke.has_layer:
+                first.setdefault(stroke.layer, (client, stroke))
+        return list(first.values())
 
     @contextlib.contextmanager
     def _aside(self, strokes: list[LiveStroke]) -> Iterator[None]:

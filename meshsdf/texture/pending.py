@@ -123,7 +123,8 @@ class PendingTable:
             before = self._counts.pop(client, 0)
             self._lock.note(self._lock.seq, self.n_rows)  # too few for a moment is no damage
             try:
-                self._write(self.forget(client), *((INSERT, row) for row in rows))
+                forget = (self.forget(client),) if before else ()
+                self._write(*forget, *((INSERT, row) for row in rows))
                 before = len(rows)
             finally:
                 self._counts[client] = before

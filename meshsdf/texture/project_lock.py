@@ -55,8 +55,12 @@ class ProjectLock:
     def note(self, seq: int, n_pending: int) -> None:
         """Note which operation was acknowledged last, and how many batches are no operations."""
         self.seq, self.n_pending = seq, n_pending
-        os.lseek(self._file, 0, os.SEEK_SET)
-        os.write(self._file, f"{os.getpid()} {seq} {n_pending}\n".encode().ljust(RECORD))
+        record = f"{os.getpid()} {seq} {n_pending}\n".encode().ljust(RECORD)
+        if hasattr(os, "pwrite"):
+            os.pwrite(self._file, record, 0)
+        else:
+            os.lseek(self._file, 0, os.SEEK_SET)
+            os.write(self._file, record)
 
     def release(self, *, keep: bool = False) -> None:
         """Let others open the project; ``keep`` leaves the note."""
