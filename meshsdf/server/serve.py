@@ -44,7 +44,8 @@ def listen(address: str, port: int) -> socket.socket:
     except ValueError:
         what = f"{address!r} is no IP address"
         raise ServerError(what, where, "give one in numbers, such as 192.168.0.7") from None
-    found = socket.socket(family, socket.SOCK_STREAM)
+    # The protocol by name: only then asyncio lets short messages go without waiting for longer ones
+    found = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
         if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows lets others share a port otherwise
             found.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)

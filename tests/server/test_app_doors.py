@@ -1,6 +1,7 @@
 """The whole server's doors: who is let in, on HTTP and on the WebSocket."""
 
 import json
+import socket
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -117,6 +118,15 @@ def test_a_socket_stays_open_longer_than_requests_may_take(server, monkeypatch):
             pass
 
 
+def test_short_messages_do_not_wait_for_the_other_side(server):
+    with knock(server, **server.bearer) as page:
+        page.send(encode_hello(Hello("2" * 32)))
+        page.recv(timeout=10)
+        (one,) = server.server.server_state.connections
+        accepted = one.transport.get_extra_info("socket")
+        assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+
 def test_a_server_that_ends_while_much_waits_ends_soon_and_without_a_fault(
     tmp_path, monkeypatch, caplog
 ):
@@ -127,14 +137,14 @@ def test_a_server_that_ends_while_much_waits_ends_soon_and_without_a_fault(
         caplog.at_level("ERROR"),
         ThreadPoolExecutor(1) as pool,
         running(tmp_path) as ending,
-        knock(ending, **ending.bearer) as socket,
+        knock(ending, **ending.bearer) as page,
         ending.client() as client,
     ):
-        socket.send(encode_hello(Hello("1" * 32)))
-        assert decode(socket.recv(timeout=10), downward=True).type is Type.WELCOME
+        page.send(encode_hello(Hello("1" * 32)))
+        assert decode(page.recv(timeout=10), downward=True).type is Type.WELCOME
         ending.studio._thread.submit(gate.wait)
         for cseq in range(1, 40):
-            socket.send(encode(Type.UNDO, cseq))
+            page.send(encode(Type.UNDO, cseq))
         asked = pool.submit(client.get, "/api/digest")
         time.sleep(0.3)
         ending.server.should_exit = True
