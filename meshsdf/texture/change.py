@@ -2,7 +2,9 @@
 
 A brick that was there when a recording began is never written again while somebody needs it:
 `VolumeTexture.writable` copies it. So a change is a list of slots before and after, undoing it
-swaps slots, and what it costs in memory are the bricks that were touched.
+swaps slots, and what it costs in memory are the bricks that were touched. Of a change that is far
+from now the bricks may be put by (`cold`): of one that is done those from before, of one that is
+undone those from after; what is on its other side is what the layers hold when its turn comes.
 """
 
 from collections.abc import Iterator
@@ -15,23 +17,44 @@ from jaxtyping import Int32
 
 from ..errors import TextureError
 from ..kernels.texture_lookup import ABSENT, FIRST_TILE
+from .cold import Piece, bring_back, put_by
 from .layer import Layer
 from .octree import Entries
+from .spill import Spill
 from .volume_texture import VolumeTexture
 
 Slots = Int32[np.ndarray, " n"]
 
+UNKNOWN = np.iinfo(np.int32).min
+"""In the place of a slot: what the layer holds when the change's turn comes."""
 BRICKS_AT_ONCE = 4096  # compared in one go, so that little memory is needed
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class SlotChange:
-    """Entries of one layer whose slots changed; a layer that is not there stores nothing."""
+    """Entries of one layer whose slots changed; a layer that is not there stores nothing.
+
+    Attributes
+    ----------
+    layer : Layer
+    entries : (n,) int32
+        Those of which slots are known; a pool keeps these.
+    before, after : (n,) int32
+        Slots of the entries; on the side that the layer holds they may be UNKNOWN.
+    cold : list of Piece
+        The other entries, and what they stored before the change (if it is undone: after it).
+    """
 
     layer: Layer
     entries: Entries
     before: Slots
     after: Slots
+    cold: list[Piece] = field(default_factory=list)
+
+    @property
+    def n_entries(self) -> int:
+        """Entries whose slots changed."""
+        return len(self.entries) + sum(piece.n_entries for piece in self.cold)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +129,7 @@ class Change:
     @property
     def n_entries(self) -> int:
         """Entries whose slots changed, over all layers."""
-        return sum(len(one.entries) for one in self.slots)
+        return sum(one.n_entries for one in self.slots)
 
     def undo(self, texture: VolumeTexture) -> None:
         """Put everything back as it was before; changes made later must be undone first.
@@ -115,8 +138,11 @@ class Change:
         ------
         TextureError
             It is undone already.
+        Damaged
+            Bricks that were put by cannot be read; then nothing has changed.
         """
         self._require(True, "undone")
+        self._thaw(texture)
         for one in self.slots:
             _swap(texture, one.layer, one.entries, one.before)
         self.before.restore(texture)
@@ -129,29 +155,100 @@ class Change:
         ------
         TextureError
             It is not undone.
+        Damaged
+            Bricks that were put by cannot be read; then nothing has changed.
         """
         self._require(False, "done")
+        self._thaw(texture)
         for one in self.slots:
             _swap(texture, one.layer, one.entries, one.after)
         self.after.restore(texture)
         self.is_done = True
 
-    def n_bytes(self, texture: VolumeTexture) -> int:
+    def n_hot_bytes(self, texture: VolumeTexture) -> int:
         """Memory that only this change needs: bricks of the other side of it, and the lists."""
         per_brick = sum(array[0].nbytes for array in texture.pool.arrays.values())
-        total = 0
+        bricks = sum(int(np.count_nonzero(self._sides(one)[0] >= 0)) for one in self.slots)
+        lists = sum(one.entries.nbytes + one.before.nbytes + one.after.nbytes for one in self.slots)
+        return per_brick * bricks + lists
+
+    def n_bytes(self, texture: VolumeTexture) -> int:
+        """The same, and what was put by, as it is there."""
+        cold = sum(piece.n_bytes for one in self.slots for piece in one.cold)
+        return self.n_hot_bytes(texture) + cold
+
+    def put_by(
+        self, texture: VolumeTexture, spill: Spill, needed: Int32[np.ndarray, " c"], most: int
+    ) -> int:
+        """Put by entries whose bricks changes alone need, and forget what the layers hold.
+
+        Parameters
+        ----------
+        texture : VolumeTexture
+        spill : Spill
+            Where to.
+        needed : (c,) int32
+            How often changes name each slot of the pool; it is kept up to date.
+        most : int
+            At most so many entries.
+
+        Returns
+        -------
+        n : int
+            How many were put by.
+        """
+        n = 0
         for one in self.slots:
-            kept = one.before if self.is_done else one.after
-            lists = one.entries.nbytes + one.before.nbytes + one.after.nbytes
-            total += int(np.count_nonzero(kept >= 0)) * per_brick + lists
-        return total
+            kept, known = self._sides(one)
+            _drop(texture, known, needed)
+            known[:] = UNKNOWN
+            slots = np.maximum(kept, 0)
+            alone = (kept < 0) | (texture.pool.holders[slots] == needed[slots])
+            rows = np.flatnonzero(alone)[: most - n]
+            if len(rows):
+                one.cold += put_by(texture, one.entries[rows], kept[rows], spill)
+                _drop(texture, kept[rows], needed)
+                one.entries, one.before, one.after = (
+                    np.delete(array, rows) for array in (one.entries, one.before, one.after)
+                )
+                n += len(rows)
+        return n
 
     def release(self, texture: VolumeTexture) -> None:
         """Let go of the bricks; the change can be neither undone nor redone afterwards."""
         for one in self.slots:
             texture.pool.drop(one.before)
             texture.pool.drop(one.after)
+            for piece in one.cold:
+                piece.free()
         self.slots = []
+
+    def _sides(self, one: SlotChange) -> tuple[Slots, Slots]:
+        """The slots that the layer does not have now, and those that it has."""
+        return (one.before, one.after) if self.is_done else (one.after, one.before)
+
+    def _thaw(self, texture: VolumeTexture) -> None:
+        """Bring back what was put by, and know again what the layers hold."""
+        found = []
+        try:
+            for one in self.slots:
+                found.append(bring_back(texture, one.cold))
+        except BaseException:
+            for _, slots in found:
+                texture.pool.drop(slots)
+            raise
+        for one, (entries, slots) in zip(self.slots, found, strict=True):
+            kept, known = self._sides(one)
+            kept = np.concatenate([kept, slots])
+            known = np.concatenate([known, np.full_like(slots, UNKNOWN)])
+            one.entries = np.concatenate([one.entries, entries])
+            unknown = np.flatnonzero(known == UNKNOWN)
+            known[unknown] = one.layer.slots[one.entries[unknown]]
+            texture.pool.hold(known[unknown])
+            one.before, one.after = (kept, known) if self.is_done else (known, kept)
+            for piece in one.cold:
+                piece.free()
+            one.cold = []
 
     def _require(self, done: bool, word: str) -> None:
         if self.is_done is not done:
@@ -272,3 +369,9 @@ def _swap(texture: VolumeTexture, layer: Layer, entries: Entries, slots: Slots) 
     texture.pool.hold(slots)
     texture.pool.drop(layer.slots[entries])
     layer.slots[entries] = slots
+
+
+def _drop(texture: VolumeTexture, slots: Slots, needed: Int32[np.ndarray, " c"]) -> None:
+    """Changes need slots no longer."""
+    texture.pool.drop(slots)
+    np.subtract.at(needed, slots[slots >= 0], np.int32(1))

@@ -1,14 +1,26 @@
-"""The steps that can be undone and redone, within a budget of memory."""
+"""The steps that can be undone and redone, within a budget of memory.
 
+The bricks of the steps nearest to now stay in the texture's pool; those of the others are put by
+(`cold`): compressed, and in a temporary file when they are many.
+"""
+
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..arrays import Number
 from ..errors import TextureError
+from .blobs import Damaged
 from .change import Change, recording
+from .spill import Spill
 from .volume_texture import VolumeTexture
 
 BUDGET = 512 * 2**20
+DENSE = 8 * 2**20
+ENTRIES_AT_ONCE = 128  # put by before the clock is looked at: about a millisecond
 
 
 @dataclass(eq=False)
@@ -24,13 +36,16 @@ class Step:
     change : Change or None
         None if the budget did not allow to keep it.
     n_bytes : int
-        Memory that the change needs.
+        What the change needs, in memory and in the file.
+    n_hot : int
+        Of these, what is not put by.
     """
 
     name: str
     number: int
     change: Change | None
     n_bytes: int = 0
+    n_hot: int = 0
 
 
 class History:
@@ -41,8 +56,13 @@ class History:
     texture : VolumeTexture
         All of its edits go through `record`.
     budget : int
-        Bytes that bricks kept for undoing and redoing may take. The steps farthest from now are
-        let go first.
+        Bytes that may be kept for undoing and redoing, as they are: 512 texels a brick for those in
+        the texture's pool, what they are compressed to for those put by, in memory or in the
+        temporary file. Beyond it steps are let go, the oldest first.
+    dense : int
+        Bytes of bricks that may stay in the pool, of the steps nearest to now: undoing these takes
+        no unpacking. An eighth of the budget if that is less. They may be twice as many, and what
+        the latest steps need, until `put_some_by` is called.
     rebuild : callable, optional
         ``rebuild(n)`` brings the texture to where the first n of `steps` are done, some other way,
         and may give back changes by `keep`. It is called for steps that were let go.
@@ -51,6 +71,10 @@ class History:
     ----------
     steps : list of Step
         Oldest first; the first `n_done` are done, the others undone.
+    n_bytes, n_hot : int
+        Sums of the steps'.
+    spill : Spill
+        Where bricks are put by.
     """
 
     def __init__(
@@ -58,14 +82,20 @@ class History:
         texture: VolumeTexture,
         *,
         budget: int = BUDGET,
+        dense: int = DENSE,
         rebuild: Callable[[int], None] | None = None,
     ) -> None:
         self.texture = texture
         self.budget = budget
+        self.dense = min(dense, budget // 8)
         self.rebuild = rebuild
         self.steps: list[Step] = []
         self.n_done = 0
-        self.n_bytes = 0
+        self.n_bytes = self.n_hot = 0
+        self.spill = Spill()
+        self._hot: set[int] = set()  # indices of steps that are not all put by
+        self._shared: set[int] = set()  # of steps whose bricks others need now, too
+        self._needed: np.ndarray | None = None  # how often steps name each slot
 
     @property
     def names(self) -> list[str]:
@@ -90,21 +120,49 @@ class History:
 
     def push(self, name: str, number: int, change: Change | None) -> None:
         """Add a step that has just been done; without its change it can only be rebuilt."""
-        for step in self.steps[self.n_done :]:
-            self._let_go(step)
+        for index in range(self.n_done, len(self.steps)):
+            self._let_go(index)
         del self.steps[self.n_done :]
         self.steps.append(Step(name, number, None))
         self.n_done += 1
         if change is not None:
+            self._share_lists(change)
             self.keep(self.n_done - 1, change)
 
     def keep(self, index: int, change: Change) -> None:
         """Give a step its change, as far as the budget allows."""
-        step = self.steps[index]
-        self._let_go(step)
-        step.change = change
-        self._measure(step)
-        self._trim()
+        self._let_go(index)
+        self.steps[index].change = change
+        self._turned(index)
+
+    def put_some_by(self, seconds: Number = 0.002) -> bool:
+        """Put bricks by for a while, those of the steps farthest from now first.
+
+        Call it when nobody waits, from the thread that edits the texture. Nothing happens if the
+        bricks in the pool are few.
+
+        Parameters
+        ----------
+        seconds : float
+            Stop after this time, or up to two milliseconds later.
+
+        Returns
+        -------
+        again : bool
+            Whether there is more to do.
+        """
+        end = time.perf_counter() + seconds
+        for index in self._farthest_first():
+            while self.n_hot > self.dense and self._put_by(index, ENTRIES_AT_ONCE):
+                if time.perf_counter() >= end:
+                    return self.n_hot > self.dense
+        return False
+
+    def close(self) -> None:
+        """Let go of all steps' changes, and of the temporary file."""
+        for index in range(len(self.steps)):
+            self._let_go(index)
+        self.spill.close()
 
     def undo(self) -> str:
         """Take the latest step back, and return its name.
@@ -135,32 +193,96 @@ class History:
     def _go(self, index: int, n_done: int, turn: Callable[[Change, VolumeTexture], None]) -> None:
         step = self.steps[index]
         if step.change is not None:
-            turn(step.change, self.texture)
-            self._measure(step)
+            try:
+                turn(step.change, self.texture)
+            except Damaged as error:
+                self._let_go(index)
+                what = f"step {step.name!r} is lost for now: {error}"
+                raise TextureError(what, "undo() or redo()", "try again") from None
+            self.n_done = n_done
+            self._turned(index)
         elif self.rebuild is not None:
             self.rebuild(n_done)
+            self.n_done = n_done
+            self._trim(0)
         else:
             what = f"step {step.name!r} was let go: {self.budget} bytes did not hold it"
             raise TextureError(what, "undo() or redo()", "give the history a larger budget")
-        self.n_done = n_done
-        self._trim()
 
-    def _measure(self, step: Step) -> None:
-        now = step.change.n_bytes(self.texture) if step.change else 0
-        self.n_bytes += now - step.n_bytes
-        step.n_bytes = now
+    def _turned(self, index: int) -> None:
+        """A step's bricks are all in the pool."""
+        self._needed = None
+        self._shared.clear()
+        self._measure(index)
+        self._trim(2 * self.steps[index].n_hot)
 
-    def _let_go(self, step: Step) -> None:
+    def _measure(self, index: int) -> None:
+        step = self.steps[index]
+        n_bytes = step.change.n_bytes(self.texture) if step.change else 0
+        n_hot = step.change.n_hot_bytes(self.texture) if step.change else 0
+        self.n_bytes += n_bytes - step.n_bytes
+        self.n_hot += n_hot - step.n_hot
+        step.n_bytes, step.n_hot = n_bytes, n_hot
+        (self._hot.add if n_hot else self._hot.discard)(index)
+
+    def _let_go(self, index: int) -> None:
+        step = self.steps[index]
         if step.change is not None:
             step.change.release(self.texture)
             step.change = None
-            self._measure(step)
+            self._needed = None
+            self._measure(index)
 
-    def _trim(self) -> None:
-        """Let go of steps, the oldest first, then those that are to be redone last."""
+    def _share_lists(self, change: Change) -> None:
+        """Most steps leave the list of layers alone: let them have one between them."""
+        if self.n_done > 1 and (last := self.steps[self.n_done - 2].change) is not None:
+            if change.before.same(last.after):
+                change.before = last.after
+            if change.after.same(change.before):
+                change.after = change.before
+
+    def _farthest_first(self, nearest: int = 1) -> list[int]:
+        """Indices of steps that may be put by; those to be undone or redone next if ``nearest`` is
+        0."""
+        now = self.n_done - 0.5
+        far = [index for index in self._hot - self._shared if abs(index - now) > nearest]
+        return sorted(far, key=lambda index: (-abs(index - now), index))
+
+    def _put_by(self, index: int, most: int) -> int:
+        """Put some of a step's bricks by; how many entries that were."""
+        if self._needed is None:
+            self._needed = self._count_needed()
+        step = self.steps[index]
+        n = step.change.put_by(self.texture, self.spill, self._needed, most)
+        self._measure(index)
+        if not n:
+            self._shared.add(index)
+        return n
+
+    def _count_needed(self) -> np.ndarray:
+        """(c,) int32: how often changes name each slot of the pool."""
+        needed = np.zeros(len(self.texture.pool.holders), np.int32)
+        for step in self.steps:
+            for one in step.change.slots if step.change is not None else ():
+                for slots in (one.before, one.after):
+                    np.add.at(needed, slots[slots >= 0], np.int32(1))
+        return needed
+
+    def _trim(self, n_bytes: int) -> None:
+        """Put by about so many bytes if too much is not; let go of steps, the oldest first, then
+        those that are to be redone last, until the budget is kept."""
+        per_brick = sum(array[0].nbytes for array in self.texture.pool.arrays.values())
+        most = n_bytes // per_brick + ENTRIES_AT_ONCE
+        for index in self._farthest_first() if self.n_hot > 2 * self.dense else ():
+            most -= self._put_by(index, most)
+            if most <= 0 or self.n_hot <= 2 * self.dense:
+                break
         if self.n_bytes <= self.budget:
             return
-        for step in [*self.steps[: self.n_done], *reversed(self.steps[self.n_done :])]:
-            self._let_go(step)
+        for index in self._farthest_first(nearest=0):
+            if self.n_hot > self.dense:
+                self._put_by(index, self.steps[index].change.n_entries)
+        for index in [*range(self.n_done), *range(len(self.steps) - 1, self.n_done - 1, -1)]:
             if self.n_bytes <= self.budget:
                 return
+            self._let_go(index)

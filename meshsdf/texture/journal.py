@@ -315,6 +315,7 @@ class Project:
             self._is_open = False
             self._checkpoints.close()
             self.pending.close()
+            self.history.close()
             with contextlib.suppress(sqlite3.Error):  # then the log stays, which is as good
                 self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             self._connection.close()

@@ -40,14 +40,20 @@ class BrickPool:
         self._recordings: list[int] = []  # generations that began them, outermost first
         self._waiting: set[int] = set()  # slots that none needs, but that recordings may ask for
         self.arrays: dict[str, np.ndarray] = {}
-        self._free: list[int] = list(range(FIRST_CAPACITY - 1, -1, -1))
+        self._free = np.arange(FIRST_CAPACITY - 1, -1, -1, dtype=np.int32)  # the next is last
+        self._n_free = FIRST_CAPACITY
         self._first_clean = 0  # in slots from here on nothing was ever written
         self.use("base")
 
     @property
     def n_used(self) -> int:
         """Slots that somebody needs."""
-        return len(self.holders) - len(self._free)
+        return len(self.holders) - self._n_free
+
+    @property
+    def free(self) -> Slots:
+        """The slots that none needs; the last is taken first."""
+        return self._free[: self._n_free]
 
     @property
     def n_bytes(self) -> int:
@@ -66,26 +72,29 @@ class BrickPool:
             what = f"there is no channel {name!r}"
             raise TextureError(what, "channel=...", f"use one of {', '.join(self.channels)}")
         if name not in self.arrays:
-            channel = self.channels[name]
-            self.arrays[name] = _empty_bricks(len(self.holders), channel)
+            array = _room_for_bricks(len(self.holders), self.channels[name])
+            array[: self._first_clean] = self.channels[name].nothing
+            self.arrays[name] = array
         return self.arrays[name]
 
     def take(self, n: int) -> Slots:
         """Return n free slots, held once, in which nothing was ever written."""
         self.reserve(n)
-        slots = np.array([self._free.pop() for _ in range(n)], np.int32)
+        self._n_free -= n
+        slots = self._free[self._n_free : self._n_free + n][::-1].copy()
         self.holders[slots] = 1
         self.born[slots] = self.generation
         used_before = slots[slots < self._first_clean]
         for name, array in self.arrays.items():
-            array[used_before] = self.channels[name].nothing
+            nothing = self.channels[name].nothing
+            array[used_before if nothing == 0 else slots] = nothing
         self._first_clean = max(self._first_clean, int(slots.max(initial=-1)) + 1)
         return slots
 
     def reserve(self, n: int) -> None:
         """Make room for n slots, growing at most once."""
-        if len(self._free) < n:
-            self._grow(n - len(self._free))
+        if self._n_free < n:
+            self._grow(n - self._n_free)
 
     def copies(self, slots: Slots) -> Slots:
         """Return new slots, held once, with the texels of others."""
@@ -107,10 +116,12 @@ class BrickPool:
         np.subtract.at(self.holders, dropped, np.int32(1))
         unneeded = np.unique(dropped[self.holders[dropped] == 0])[::-1]
         known = self._is_known(unneeded)
-        free = unneeded[~known].tolist()
-        self._waiting.update(unneeded[known].tolist())
-        self._waiting.difference_update(free)  # known to a recording within one that is not over
-        self._free.extend(free)
+        free = unneeded[~known]
+        if self._recordings:
+            self._waiting.update(unneeded[known].tolist())
+            # Known to a recording within one that is not over
+            self._waiting.difference_update(free.tolist())
+        self._give_back(free)
 
     def is_shared(self, slots: Slots) -> np.ndarray:
         """Whether others hold the slots, too, or the texels are from before a recording."""
@@ -126,7 +137,7 @@ class BrickPool:
         self._recordings.pop()
         if not self._recordings:
             waiting = np.array(sorted(self._waiting, reverse=True), np.int64)
-            self._free.extend(waiting[self.holders[waiting] == 0].tolist())
+            self._give_back(waiting[self.holders[waiting] == 0])
             self._waiting = set()
 
     def _is_known(self, slots: Slots) -> np.ndarray:
@@ -142,17 +153,25 @@ class BrickPool:
         self.holders = np.concatenate([self.holders, np.zeros(more, np.int32)])
         self.born = np.concatenate([self.born, np.zeros(more, np.int64)])
         for name, array in self.arrays.items():
-            grown = _empty_bricks(before + more, self.channels[name])
-            grown[:before] = array
+            grown = _room_for_bricks(before + more, self.channels[name])
+            grown[: self._first_clean] = array[: self._first_clean]
             self.arrays[name] = grown
-        self._free = list(range(before + more - 1, before - 1, -1)) + self._free
+        free = np.empty(before + more, np.int32)
+        free[:more] = np.arange(before + more - 1, before - 1, -1)
+        free[more : more + self._n_free] = self.free
+        self._free, self._n_free = free, more + self._n_free
+
+    def _give_back(self, slots: np.ndarray) -> None:
+        """They are taken before those that were never used."""
+        self._free[self._n_free : self._n_free + len(slots)] = slots
+        self._n_free += len(slots)
 
 
-def _empty_bricks(n: int, channel: Channel) -> np.ndarray:
-    """(n, 512) texels in which nothing was written; zeros take memory only when they are."""
+def _room_for_bricks(n: int, channel: Channel) -> np.ndarray:
+    """(n, 512) texels that take memory only when they are written; zeros if that is nothing."""
     if channel.nothing == 0:
         return np.zeros((n, TEXELS), channel.dtype)
-    return np.full((n, TEXELS), channel.nothing, channel.dtype)
+    return np.empty((n, TEXELS), channel.dtype)
 
 
 class TilePool:

@@ -160,7 +160,7 @@ def test_recordings_within_recordings_keep_no_slot_twice(texture):
             with recording(texture) as inner:
                 fill(texture, range(20), value)
             inner.release(texture)
-    free = texture.pool._free
+    free = texture.pool.free.tolist()
     assert len(set(free)) == len(free)
     held = np.flatnonzero(texture.pool.holders)
     assert not set(held) & set(free)

@@ -118,15 +118,15 @@ def test_an_error_is_no_step():
 
 
 def test_beyond_the_budget_the_oldest_steps_are_let_go():
-    _, history = fresh(budget=30 * BRICK)
+    _, history = fresh(budget=2 * BRICK)
     digests = balls(history, 30)
-    assert history.n_bytes <= 30 * BRICK
+    assert history.n_bytes <= 2 * BRICK
     n = sum(step.change is not None for step in history.steps)
     assert 1 <= n < 30
     for expected in digests[-2 : -2 - n : -1]:
         history.undo()
         assert digest(history.texture) == expected
-    with pytest.raises(TextureError, match="'paint-ball' was let go: 61440 bytes"):
+    with pytest.raises(TextureError, match="'paint-ball' was let go: 4096 bytes"):
         history.undo()
 
 

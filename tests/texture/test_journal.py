@@ -143,22 +143,22 @@ def test_an_operation_that_cannot_be_kept_is_taken_back(tmp_path):
 def test_undo_reaches_back_beyond_memory_and_checkpoints(tmp_path, monkeypatch):
     monkeypatch.setattr(checkpoints, "OPERATIONS_PER_CHECKPOINT", 8)
     digests = []
-    with fresh(tmp_path, budget=20_000) as project:
+    with fresh(tmp_path, budget=2_000) as project:
         project.apply(Operation("add-layer"))
         digests.append(project.digest())
         for n in range(20):
             project.apply(ball(n, 0.2 + 0.01 * n))
             digests.append(project.digest())
-        assert project.history.n_bytes <= 20_000
+        assert project.history.n_bytes <= 2_000
         assert project.history.steps[0].change is None
-    with Project.open(tmp_path / "a.mtex", budget=20_000) as project:
+    with Project.open(tmp_path / "a.mtex", budget=2_000) as project:
         for digest in digests[-2::-1]:
             project.undo()
             assert project.digest() == digest
         for digest in digests[1:]:
             project.redo()
             assert project.digest() == digest
-            assert project.history.n_bytes <= 20_000
+            assert project.history.n_bytes <= 2_000
 
 
 def test_layers_keep_their_identity_through_rebuilding(tmp_path):
