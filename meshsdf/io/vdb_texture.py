@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..grid.brick_index import BrickIndex
 from ..texture.volume_texture import VolumeTexture
 from .vdb import Compression, write_vdb_grids
 from .vdb_grid import VdbGrid
@@ -16,6 +17,7 @@ class _Colors:
 
     texture: VolumeTexture
     level: int
+    index: BrickIndex
     alpha: bool
 
     @property
@@ -24,12 +26,12 @@ class _Colors:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        n = self.texture.octree.levels[self.level].n_bricks
+        n = self.index.n_bricks
         return (n, 8, 8, 8) if self.alpha else (n, 8, 8, 8, 3)
 
     def __getitem__(self, slots: np.ndarray) -> np.ndarray:
         octree = self.texture.octree
-        bricks = octree.levels[self.level].coordinates[slots]
+        bricks = self.index.coordinates[slots]
         entries = octree.find(self.level, bricks)
         entries, brick = _with_other_sheets(octree, entries)
         points, normals = self.texture.places(entries)
@@ -79,14 +81,14 @@ def write_vdb_texture(
     Where two sides of something thin share a voxel, the file holds the colour of one.
     """
     octree = texture.octree
-    index = octree.levels[level]
+    index = octree.index(level)
     masks = np.zeros((index.n_bricks, 8), np.uint64)
     entries = octree.find(level, index.coordinates)
     entries, brick = _with_other_sheets(octree, entries)
     np.bitwise_or.at(masks, brick, octree.tables.masks[entries])
     matrix = np.diag([*[octree.spacing(level)] * 3, 1.0])
-    grids = [_grid("Cd", _Colors(texture, level, False), index, masks, matrix, half)]
-    alpha = _Colors(texture, level, True)
+    grids = [_grid("Cd", _Colors(texture, level, index, False), index, masks, matrix, half)]
+    alpha = _Colors(texture, level, index, True)
     if not _is_opaque(alpha, masks):
         grids.append(_grid("alpha", alpha, index, masks, matrix, half))
     write_vdb_grids(path, grids, force=force, compression=compression)

@@ -5,7 +5,7 @@ needs is packed, compressed (zlib, level 1) and given to a `Spill`. Every piece 
 becomes the same bricks again whatever has happened to the layers since.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ Slots = Int32[np.ndarray, " n"]
 
 PIECE = 256  # entries; 80 KB of texels, about 10 KB when they are compressed
 PIECES_AT_ONCE = 64
+FEWEST_FOR_THREADS = 8  # pieces; below, starting them costs more than it saves
 BRICK = 0  # among the codes of a piece; the others are as in `Layer.slots`
 HEAD = np.dtype(np.int32)
 
@@ -60,7 +61,7 @@ def put_by(texture: VolumeTexture, entries: Entries, slots: Slots, spill: Spill)
             part = parts[piece]
             blobs[piece] = pack(_packed(texture, entries[part], slots[part]))
 
-        run_pieces(work, len(parts))
+        _run(work, len(parts))
         for part, (codec, crc, data) in zip(parts, blobs, strict=True):
             n_bricks = int(np.count_nonzero(slots[part] >= 0))
             number = spill.put(data)
@@ -90,7 +91,7 @@ def bring_back(texture: VolumeTexture, pieces: Sequence[Piece]) -> tuple[Entries
         piece = pieces[number]
         data[number] = unpack((piece.codec, piece.crc, stored[number]), "a piece that was put by")
 
-    run_pieces(work, len(pieces))
+    _run(work, len(pieces))
     pool = texture.pool
     pool.reserve(sum(piece.n_bricks for piece in pieces))
     # Whoever follows slots knows by their generation that those hold something new
@@ -99,6 +100,14 @@ def bring_back(texture: VolumeTexture, pieces: Sequence[Piece]) -> tuple[Entries
     found = [_unpacked(texture, one) for one in data]
     entries = np.concatenate([entries for entries, _ in found])
     return entries, np.concatenate([slots for _, slots in found])
+
+
+def _run(work: Callable[[int], None], n_pieces: int) -> None:
+    if n_pieces >= FEWEST_FOR_THREADS:
+        run_pieces(work, n_pieces)
+        return
+    for piece in range(n_pieces):
+        work(piece)
 
 
 def _packed(texture: VolumeTexture, entries: Entries, slots: Slots) -> bytes:

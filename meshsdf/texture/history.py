@@ -151,6 +151,8 @@ class History:
         again : bool
             Whether there is more to do.
         """
+        if self.n_hot <= self.dense:
+            return False
         end = time.perf_counter() + seconds
         for index in self._farthest_first():
             while self.n_hot > self.dense and self._put_by(index, ENTRIES_AT_ONCE):
@@ -261,12 +263,13 @@ class History:
 
     def _count_needed(self) -> np.ndarray:
         """(c,) int32: how often changes name each slot of the pool."""
-        needed = np.zeros(len(self.texture.pool.holders), np.int32)
-        for step in self.steps:
-            for one in step.change.slots if step.change is not None else ():
-                for slots in (one.before, one.after):
-                    np.add.at(needed, slots[slots >= 0], np.int32(1))
-        return needed
+        named = [np.empty(0, np.int32)]
+        for index in self._hot:
+            for one in self.steps[index].change.slots:
+                named += [one.before, one.after]
+        slots = np.concatenate(named)
+        found = np.bincount(slots[slots >= 0], minlength=len(self.texture.pool.holders))
+        return found.astype(np.int32)
 
     def _trim(self, n_bytes: int) -> None:
         """Put by about so many bytes if too much is not; let go of steps, the oldest first, then

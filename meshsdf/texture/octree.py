@@ -43,8 +43,6 @@ class Octree:
     ----------
     texel : float
         Spacing of the finest level's nodes, in units of the texture's space.
-    levels : tuple of BrickIndex
-        The bricks of every level, finest first.
     level_first : (L + 1,) int64
         Where the entries of every level begin. An entry is one sheet of one brick.
     tables : OctreeTables
@@ -52,7 +50,6 @@ class Octree:
     """
 
     texel: float
-    levels: tuple[BrickIndex, ...]
     level_first: Int64[np.ndarray, " l"]
     tables: OctreeTables
 
@@ -99,12 +96,19 @@ class Octree:
     @property
     def n_levels(self) -> int:
         """Number of levels."""
-        return len(self.levels)
+        return len(self.level_first) - 1
 
     @property
     def n_entries(self) -> int:
         """Sheets of bricks at all levels."""
         return int(self.level_first[-1])
+
+    def index(self, level: int) -> BrickIndex:
+        """The bricks of a level, as an index made anew: lookups have pages of their own."""
+        bricks = self.tables.bricks[slice(*self.level_first[level : level + 2])]
+        is_first = np.ones(len(bricks), bool)  # of the sheets of a brick
+        is_first[1:] = (bricks[1:] != bricks[:-1]).any(axis=1)
+        return BrickIndex.from_coordinates(bricks[is_first])
 
     def spacing(self, level: int) -> float:
         """Distance between the nodes of a level, in units of the texture's space."""
@@ -225,10 +229,10 @@ def _top_bricks(triangles: Triangles, n_levels: int) -> _Reach:
 def _assembled(texel: float, levels: list[_Level]) -> Octree:
     """One table of all levels."""
     heads, pages, groups = np.empty((len(levels), 4), np.int64), [], []
-    indices = [BrickIndex.from_coordinates(level.reach.bricks) for level in levels]
     n_pages = n_entries = n_groups = 0
     level_first = [0]
-    for number, (level, index) in enumerate(zip(levels, indices, strict=True)):
+    for number, level in enumerate(levels):
+        index = BrickIndex.from_coordinates(level.reach.bricks)
         code = n_entries + np.cumsum(level.n_sheets) - level.n_sheets
         split = np.flatnonzero(level.n_sheets > 1)
         groups.append(np.stack([code[split], level.n_sheets[split]], axis=1))
@@ -259,7 +263,7 @@ def _assembled(texel: float, levels: list[_Level]) -> Octree:
         lambda piece: link_entries(tables, 4096 * piece, min(4096 * (piece + 1), n_entries)),
         -(-n_entries // 4096),
     )
-    return Octree(texel, tuple(indices), np.array(level_first, np.int64), tables)
+    return Octree(texel, np.array(level_first, np.int64), tables)
 
 
 def _page_table(index: BrickIndex, code: np.ndarray, first: int) -> np.ndarray:

@@ -51,6 +51,19 @@ def test_what_was_written_before_is_gone_from_a_slot_given_again():
     assert (pool.arrays["base"][pool.take(2)] == 0).all()
 
 
+def test_a_channel_used_late_holds_nothing_in_slots_old_and_new():
+    pool = BrickPool(CHANNELS)
+    old = pool.take(FIRST_CAPACITY // 2)
+    for name in ("mask", "normal", "height"):
+        assert (pool.use(name)[old] == CHANNELS[name].nothing).all()
+        pool.use(name)[old] = 7
+    pool.drop(old[:5])
+    new = pool.take(7 * FIRST_CAPACITY)
+    for name in ("mask", "normal", "height"):
+        assert (pool.arrays[name][new] == CHANNELS[name].nothing).all()
+        assert (pool.arrays[name][old[5:]] == 7).all()
+
+
 def test_copies_hold_the_same_texels_in_every_channel_and_are_apart():
     pool = BrickPool(CHANNELS)
     slots = pool.take(2)
