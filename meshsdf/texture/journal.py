@@ -120,7 +120,7 @@ class Project:
         resolution, texel, base
             As `VolumeTexture.around` takes them.
         budget : int
-            Bytes of memory for undoing, see `History`.
+            Bytes for undoing, see `History`.
         warn : callable
             Called with a sentence for whatever is not as it should be.
 
