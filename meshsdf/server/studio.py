@@ -238,6 +238,8 @@ class Studio:
                 subscriber.refill()
         except MeshsdfError as error:
             self.project.warn(f"pages could not be told what changed: {error.what}")
+        if not self.is_busy:
+            self.project.history.put_some_by()
 
     def _refresh(self) -> None:
         """Keep `state` up to date; pages are told at the next tick."""
