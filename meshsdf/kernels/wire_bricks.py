@@ -1,15 +1,16 @@
-"""Bricks of a texture as a graphics card samples them: 9^3 nodes, 8 bits, everything resolved.
+"""Bricks of a texture as a graphics card samples them: 9^3 nodes, everything resolved.
 
 A brick that goes over the wire holds its own 8^3 nodes and the first ones of the bricks after it,
 so that trilinear filtering needs no other. What its nodes say is F_l of `texture_lookup`, see
-`wire_nodes`. Colours are premultiplied in linear light, then sRGB in 8 bits; alpha is linear.
+`wire_nodes`; in which bytes, see `wire_codes`.
 """
 
 import numpy as np
 from numba import njit
 
-from .texel_codes import BYTE, F0, F1, LINEAR, SRGB8, encode
+from .texel_codes import F0, F1, SRGB8
 from .texture_lookup import read_texel, stored_value
+from .wire_codes import node_code, node_numbers
 from .wire_nodes import (
     COARSER,
     DEEP,
@@ -32,20 +33,20 @@ HEAD_BYTES = 12
 OPAQUE = 255 << 24
 
 NOTHING, FLAT, TEXELS = 0, 1, 2  # states of a brick: coarser levels are shown, one colour, many
-NO_PRINT, EMPTY_PRINT = 0, 1
+NO_PRINT, EMPTY_PRINT, BLANK_PRINT = 0, 1, 2
 MIXER = np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio, odd
 
 
 @njit(cache=True, nogil=True)
 def resolve(
-    tables, slots, pool, tiles, kind, entries, begin, end, with_colors, grid, origin, holders,
-    exist, wanted, made_of, states, counts, prints, masks_out, codes,
+    tables, slots, pool, tiles, kind, picture, entries, begin, end, with_codes, grid, origin,
+    holders, exist, wanted, made_of, states, counts, prints, masks_out, codes,
 ):  # fmt: skip
-    """Make the wire bricks of ``entries[begin:end]``, or only see what they are made of.
+    """Make a picture's wire bricks of ``entries[begin:end]``, or only see what they are made of.
 
     Fills, a row per entry, made_of (n,) with PRESENT (some node is stored, so it is sent),
     INCOMPLETE (some node is not, and comes from the level above) and DEEP (or from above that);
-    and with colours states (n,), counts (n,) of codes, prints (n,) uint64 (two bricks of the same
+    and with codes states (n,), counts (n,) of codes, prints (n,) uint64 (two bricks of the same
     are the same), masks_out (n, 92) bytes and codes (n, 729) uint32. Scratch, of 729 each: grid
     uint32, origin uint8, holders int64; exist and wanted (9, 9) int64.
     """
@@ -59,18 +60,18 @@ def resolve(
         if found & INCOMPLETE and is_deep(tables, slots, e, origin, holders):
             found |= DEEP
         made_of[n] = found
-        if with_colors:
+        if with_codes:
             states[n], counts[n], prints[n] = NOTHING, 0, np.uint64(EMPTY_PRINT)
             if found & PRESENT:
-                _fill_grid(tables, slots, pool, tiles, kind, e, origin, holders, grid)
+                _fill_grid(tables, slots, pool, tiles, kind, picture, e, origin, holders, grid)
                 if found & INCOMPLETE:
-                    _fill_gaps(origin, grid)
+                    _fill_gaps(picture, origin, grid)
                 states[n], counts[n] = _packed(grid, origin, masks_out[n], codes[n])
                 prints[n] = _print_of(states[n], counts[n], masks_out[n], codes[n])
 
 
 @njit(cache=True, nogil=True)
-def _fill_grid(tables, slots, pool, tiles, kind, e, origin, holders, grid):
+def _fill_grid(tables, slots, pool, tiles, kind, picture, e, origin, holders, grid):
     """Put what nodes show in the grid; of those that the sheet lacks only lonely ones."""
     sheets, masks = tables.sheets, tables.masks
     level = np.int64(tables.levels[e])
@@ -99,11 +100,11 @@ def _fill_grid(tables, slots, pool, tiles, kind, e, origin, holders, grid):
                 np.float64(nx), np.float64(ny), np.float64(nz),
             )  # fmt: skip
             origin[at] = COARSER
-        grid[at] = encode(SRGB8, r * a, g * a, b * a, a)
+        grid[at] = node_code(picture, r * a, g * a, b * a, a)
 
 
 @njit(cache=True, nogil=True)
-def _fill_gaps(origin, grid):
+def _fill_gaps(picture, origin, grid):
     """Give nodes that the sheet lacks the mean of those around."""
     for at in range(NODES):
         if origin[at] != MISSING:
@@ -115,13 +116,9 @@ def _fill_gaps(origin, grid):
                 for z in range(max(k - 1, 0), min(k + 2, SIDE)):
                     near = 81 * x + 9 * y + z
                     if origin[near] == STORED or origin[near] == COARSER:
-                        word = np.int64(grid[near])
-                        r += LINEAR[word & 255]
-                        g += LINEAR[(word >> 8) & 255]
-                        b += LINEAR[(word >> 16) & 255]
-                        a += np.float32(word >> 24) * BYTE
-                        n += F1
-        grid[at] = encode(SRGB8, r / n, g / n, b / n, a / n)
+                        nr, ng, nb, na = node_numbers(picture, np.int64(grid[near]))
+                        r, g, b, a, n = r + nr, g + ng, b + nb, a + na, n + F1
+        grid[at] = node_code(picture, r / n, g / n, b / n, a / n)
 
 
 @njit(cache=True, nogil=True)
@@ -154,7 +151,7 @@ def _print_of(state, n, mask, codes):
     for at in range(n if state == TEXELS else 1):
         found = (found ^ np.uint64(codes[at])) * MIXER
         found ^= found >> np.uint64(32)
-    return max(found, np.uint64(EMPTY_PRINT + 1))
+    return max(found, np.uint64(BLANK_PRINT + 1))
 
 
 @njit(cache=True, nogil=True)

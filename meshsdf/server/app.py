@@ -27,6 +27,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from ..errors import MeshsdfError
+from ..kernels.wire_codes import PICTURES
 from ..mesh import Mesh
 from ..texture.snapshot import snapshot
 from .apart import Turnstile, apart
@@ -115,12 +116,16 @@ class Service:
         if not 0 <= last - first <= MOST_BRICKS:
             what = f"entries {first} to {last} are no range of up to {MOST_BRICKS}"
             raise Refused(400, what, "GET /api/bricks", "ask for fewer at a time")
-        payload = await self.studio.do(_payload, self.studio, first, last)
+        picture = request.query_params.get("picture", PICTURES[0])
+        if picture not in PICTURES:
+            what = f"there is no picture {picture[:40]!r}"
+            raise Refused(400, what, "GET /api/bricks", f"use one of {', '.join(PICTURES)}")
+        payload = await self.studio.do(_payload, self.studio, first, last, picture)
         return _tagged(request, payload, _tag(payload))
 
     async def digest(self, request: Request) -> Response:
         """Checksums of the project and of what is shown."""
-        return JSONResponse(await self.studio.do(_digests, self.studio))
+        return JSONResponse(await self.studio.do(self.studio.digests))
 
     async def add_image(self, request: Request) -> Response:
         """Keep a picture for a projection."""
@@ -218,14 +223,9 @@ def make_app(service: Service, static: Path = STATIC) -> App:
     return Guard(Starlette(routes=routes, exception_handlers=handlers), service.gate)
 
 
-def _payload(studio: Studio, first: int, last: int) -> bytes:
+def _payload(studio: Studio, first: int, last: int, picture: str) -> bytes:
     studio.look()
-    return studio.bricks.range_payload(first, last)
-
-
-def _digests(studio: Studio) -> dict[str, str]:
-    studio.look()
-    return {"project": studio.project.digest(), "shown": studio.bricks.digest()}
+    return studio.bricks.range_payload(first, last, picture)
 
 
 def _is_open(websocket: WebSocket) -> bool:

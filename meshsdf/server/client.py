@@ -18,9 +18,11 @@ import numpy as np
 
 from ..arrays import Number, Points, Values, Vector3
 from ..errors import ServerError
+from ..kernels.wire_codes import PICTURES
 from ..texture.brush import Brush
 from .messages import (
     COMPLETE,
+    PICTURE_SHIFT,
     Hello,
     Message,
     OperationAsked,
@@ -33,7 +35,7 @@ from .messages import (
     encode_view,
 )
 from .samples import MOST_SAMPLES, Normals, Samples
-from .wire_bricks import brick_records, bricks_digest
+from .wire_records import brick_records, bricks_digest
 
 PAUSES = (0.05, 0.1, 0.25, 0.5, 1.0)  # seconds before the tries to come back
 PATIENCE = 60.0  # seconds
@@ -60,8 +62,11 @@ class Painter:
         The answer to GET /api/project.
     state : dict
         Layers and steps, as the server told last.
+    pictures : dict of str to dict of int to bytes
+        What is shown: of every picture ("base", "normal", "height") and entry the brick, as it
+        came.
     bricks : dict of int to bytes
-        What is shown: of every entry the brick, as it came.
+        Those of the base colour.
     n_connections : int
 
     Raises
@@ -87,7 +92,8 @@ class Painter:
         self.facts = self.get_json("/api/project")
         self.origin: Vector3 = np.array(self.facts["origin"], np.float64)
         self.state: dict[str, Any] = {}
-        self.bricks: dict[int, bytes] = {}
+        self.pictures: dict[str, dict[int, bytes]] = {name: {} for name in PICTURES}
+        self.bricks = self.pictures["base"]
         self.n_connections = 0
         self._run, self._since, self._newest = "", 0, 0
         self._cseq = self._sent = 0
@@ -171,20 +177,21 @@ class Painter:
         """The operation's number in the journal that a message has become; 0 if none."""
         return self._numbers.get(cseq, 0)
 
-    def digest(self) -> str:
-        """SHA-256 of the bricks that are here; the server's ``shown`` of GET /api/digest."""
+    def digest(self, picture: str = "base") -> str:
+        """SHA-256 of the bricks that are here of a picture, as GET /api/digest gives it."""
         with self._changed:
-            return bricks_digest(sorted(self.bricks.items()))
+            return bricks_digest(sorted(self.pictures[picture].items()))
 
     def catch_up(self) -> str:
-        """Wait for all messages and all bricks; the digest that is the server's then, too."""
+        """Wait for all messages and all bricks; the digest of colours that is the server's, too."""
         self.wait()
         until = time.monotonic() + self.patience
         while time.monotonic() < until:
-            wanted = self.get_json("/api/digest")["shown"]
+            found = self.get_json("/api/digest")
+            wanted = {"base": found["shown"]} | {name: found[name] for name in PICTURES[1:]}
             with self._changed:
-                if self._changed.wait_for(lambda wanted=wanted: self.digest() == wanted, 0.5):
-                    return wanted
+                if self._changed.wait_for(lambda wanted=wanted: self._shows(wanted), 0.5):
+                    return wanted["base"]
         raise ServerError("the bricks here are not the server's", WHERE, "wait longer")
 
     def get(self, path: str) -> bytes:
@@ -229,6 +236,9 @@ class Painter:
         if socket is not None:
             socket.close()
         self._thread.join()
+
+    def _shows(self, digests: dict[str, str]) -> bool:
+        return all(self.digest(picture) == wanted for picture, wanted in digests.items())
 
     def _headers(self) -> dict[str, str]:
         return {"Authorization": f"Bearer {self._token}"}
@@ -303,9 +313,10 @@ class Painter:
             self._errors.append(ServerError(body["what"], body["where"], body["fix"]))
             self._pump()
         elif message.type is Type.BRICKS:
+            bricks = self.pictures[PICTURES[message.flags >> PICTURE_SHIFT]]
             for entry, version, brick in brick_records(body):
                 self._newest = max(self._newest, version)
-                self.bricks[entry] = brick
+                bricks[entry] = brick
             if message.flags & COMPLETE:
                 self._since = self._newest
             socket.send(encode(Type.SHOWN, message.seq))
@@ -313,7 +324,8 @@ class Painter:
     def _welcomed(self, socket: Any, body: dict[str, Any]) -> None:
         if body["run"] != self._run:
             self._run, self._since, self._newest = body["run"], 0, 0
-            self.bricks.clear()
+            for bricks in self.pictures.values():
+                bricks.clear()
         self.state = body["state"]
         self._cseq = max(self._cseq, body["cseq"])
         for cseq in [one for one in self._waiting if one <= body["cseq"]]:

@@ -10,6 +10,7 @@ from ..arrays import Vector3
 from ..errors import ServerError
 from ..kernels.blending import MODES
 from ..kernels.brush import FALLOFFS
+from ..kernels.wire_codes import PICTURES
 from ..mesh import Mesh
 from ..texture.brush import CHANNELS, KINDS, SHAPES, Brush
 from ..texture.colors import linear_color
@@ -22,8 +23,9 @@ from ..texture.source_kinds import PROJECTIONS
 from ..texture.volume_texture import VolumeTexture
 from .exports import FORMATS
 from .limits import MOST_IMAGE, MOST_PIXELS
+from .messages import VERSION
 
-VERSION = 1
+DISPLAYS = ("color", "normal", "displacement")  # how pages can show what is painted
 BRUSH_SHARE = 0.04  # of the box's longest side: the radius of the first brush
 MOST_FACES = 20_000_000
 BARE = (0.0, 0.0, 0.0, 0.0)  # what is seen where nothing was ever painted
@@ -64,6 +66,8 @@ def project_facts(project: Project, name: str, origin: Vector3) -> dict[str, Any
         "base_color": list(BARE),
         "procedurals": [_procedural(*known, longest) for known in PATTERNS.items()],
         "blend_modes": list(MODES),
+        "pictures": list(PICTURES),
+        "displays": list(DISPLAYS),
         "brush": {
             "kinds": list(KINDS),
             "channels": list(CHANNELS),

@@ -15,17 +15,20 @@ import numpy as np
 
 from ..arrays import Vector3
 from ..errors import ServerError
+from ..kernels.wire_codes import PICTURES
 from .plain_json import json_bytes, json_object
 from .samples import MOST_SAMPLES, SAMPLE_BYTES, Samples
 
 __all__ = ["Hello", "Message", "OperationAsked", "StrokeBegin", "Type", "View", "decode", "encode"]
 
-VERSION = 1
+VERSION = 2
 HEADER = struct.Struct("<BBHIII")
 MOST_BYTES = 2**20  # of a frame that goes up
 COMPLETE = 1  # flag of BRICKS: whoever got this has everything
+PICTURE_SHIFT = 1  # its other flags are the number of the picture that the bricks are of
 VIEW = struct.Struct("<6f")
 ACK = struct.Struct("<I")
+MOST_FLAGS = (len(PICTURES) - 1) << PICTURE_SHIFT | COMPLETE
 CLIENT_DIGITS = 32
 MOST_KIND = 64  # characters of an operation's name
 
@@ -133,7 +136,7 @@ def encode(kind: Type, seq: int = 0, payload: bytes = b"", flags: int = 0) -> by
     Examples
     --------
     >>> encode(Type.STROKE_END, 7).hex(" ", 4)
-    '04010000 07000000 00000000 00000000'
+    '04020000 07000000 00000000 00000000'
     """
     return HEADER.pack(kind, VERSION, flags, seq, len(payload), zlib.crc32(payload)) + payload
 
@@ -196,7 +199,7 @@ def decode(data: bytes, *, downward: bool = False) -> Message:
     if checksum != zlib.crc32(payload):
         raise _wrong("the payload is not what its checksum says")
     kind = _type(number, downward)
-    if flags and kind is not Type.BRICKS:
+    if flags > (MOST_FLAGS if kind is Type.BRICKS else 0):
         raise _wrong(f"{kind.name} has flags {flags}", "leave them 0")
     if kind in DURABLE and seq == 0:
         raise _wrong(f"{kind.name} has no number", "count from 1")

@@ -12,6 +12,7 @@ from ..arrays import Vector3
 from ..grid.brick_index import BRICK
 from ..texture.octree import Octree
 from ..texture.volume_texture import VolumeTexture
+from .messages import VERSION
 from .plain_json import json_bytes
 from .samples import octahedral_codes
 
@@ -53,7 +54,7 @@ def octree_bytes(texture: VolumeTexture) -> bytes:
         at += len(parts[-1])
     head = json_bytes(
         {
-            "version": 1,
+            "version": VERSION,
             "texel": octree.texel,
             "origin": wire_origin(texture).tolist(),
             "levels": octree.n_levels,

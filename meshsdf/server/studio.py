@@ -22,7 +22,7 @@ from ..texture.live import LiveStrokes
 from ..texture.operations import Operation
 from .octree_wire import wire_origin
 from .state import state_of
-from .wire_bricks import WireBricks
+from .wire_bricks import RELIEFS, WireBricks
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -191,6 +191,12 @@ class Studio:
         if subscriber in self._subscribers:
             self._subscribers.remove(subscriber)
             self._thread.submit(self._run, bool)
+
+    def digests(self) -> dict[str, str]:
+        """On the studio's thread: the project's digest, and of every picture the bricks'."""
+        self.look()
+        found = {"project": self.project.digest(), "shown": self.bricks.digest()}
+        return found | {name: self.bricks.digest(name) for name in RELIEFS}
 
     async def close(self) -> None:
         """End open strokes, close the project and end the threads."""

@@ -337,15 +337,21 @@ def _really_changed(texture: VolumeTexture, layer: Layer, entries: Entries, old:
     return entries[~np.isin(entries, bricks[same])]
 
 
-def same_texels(texture: VolumeTexture, entries: Entries, old: Slots, new: Slots) -> np.ndarray:
-    """(n,) bool: whether entries hold the same as bricks or tiles, where texels exist."""
+def same_texels(
+    texture: VolumeTexture, entries: Entries, old: Slots, new: Slots, channel: str | None = None
+) -> np.ndarray:
+    """(n,) bool: whether entries hold the same as bricks or tiles, where texels exist.
+
+    In all channels, or in one.
+    """
     same = np.ones(len(entries), bool)
     for begin in range(0, len(entries), BRICKS_AT_ONCE):
         part = slice(begin, begin + BRICKS_AT_ONCE)
         bits = texture.octree.tables.masks[entries[part]].view(np.uint8)
         unneeded = np.unpackbits(bits, axis=1, bitorder="little") == 0
         any_tile = bool((old[part] < 0).any() or (new[part] < 0).any())
-        for name in texture.tiles.arrays if any_tile else texture.pool.arrays:
+        names = [channel] if channel else texture.tiles.arrays if any_tile else texture.pool.arrays
+        for name in names:
             before, after = (_texels(texture, name, slots[part]) for slots in (old, new))
             same[part] &= ((before == after) | unneeded).all(axis=1)
     return same

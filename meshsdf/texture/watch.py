@@ -1,5 +1,7 @@
 """Which bricks of the picture changed since somebody looked last."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..kernels.texture_lookup import ABSENT
@@ -52,18 +54,28 @@ class Watch:
         and, if that or one around it is not stored, of coarser ones: each of those that changed is
         told, those that only show others are not.
         """
+        return self._changed((None,))[0]
+
+    def changed_in(self, channels: Sequence[str]) -> list[Entries]:
+        """As `changed`, of each of these channels by itself; what others hold does not count."""
+        return self._changed(channels)
+
+    def _changed(self, channels: Sequence[str | None]) -> list[Entries]:
         texture = self.texture
         self.layer = shown(texture)
         now = self.layer.slots
         entries = np.flatnonzero(self._seen != now).astype(np.int32)
         before, after = self._seen[entries], now[entries]
         both = np.flatnonzero((before != ABSENT) & (after != ABSENT))
-        same = np.zeros(len(entries), bool)
-        same[both] = same_texels(texture, entries[both], before[both], after[both])
+        found = []
+        for channel in channels:
+            same = np.zeros(len(entries), bool)
+            same[both] = same_texels(texture, entries[both], before[both], after[both], channel)
+            found.append(entries[~same])
         texture.pool.hold(after)
         texture.pool.drop(before)
         self._seen[entries] = after
-        return entries[~same]
+        return found
 
     def release(self) -> None:
         """Let go of all bricks; the watch is over."""

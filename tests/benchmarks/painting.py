@@ -349,7 +349,7 @@ class Slow:
                 self._take(self.socket.recv(timeout=0.2), MEGABIT)
 
     def _take(self, data, rate):
-        from meshsdf.server.wire_bricks import brick_records
+        from meshsdf.server.wire_records import brick_records
 
         self.n_bytes += len(data)
         if rate:
@@ -361,7 +361,7 @@ class Slow:
 
     def catches_up(self):
         """Whether it has what the server shows, once it may read on."""
-        from meshsdf.server.wire_bricks import bricks_digest
+        from meshsdf.server.wire_records import bricks_digest
 
         wanted = self.painter.get_json("/api/digest")["shown"]
         with contextlib.suppress(TimeoutError):

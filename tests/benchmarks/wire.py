@@ -43,7 +43,7 @@ def main() -> None:
         texture = painted(
             mesh, rng, n_layers=3, n_strokes=asked.strokes, resolution=asked.resolution
         )
-        wire = WireBricks(texture)
+        wire = WireBricks(texture).pictures["base"]
         wire.payload(wire.present[:10])
         begin = time.perf_counter()
         payload = wire.payload(wire.present)
@@ -73,8 +73,8 @@ def told_beside_painted(texture: VolumeTexture, mesh: Mesh, rng: np.random.Gener
             begin = time.perf_counter()
             stroke.add(points, normals)
             painted_at = time.perf_counter()
-            changed = wire.update()
-            n_bytes += len(wire.payload(changed))
+            changed = wire.update()["base"]
+            n_bytes += len(wire.pictures["base"].payload(changed))
             tell.append(time.perf_counter() - painted_at)
             paint.append(painted_at - begin)
             n_bricks += len(changed)

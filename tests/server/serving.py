@@ -22,12 +22,8 @@ def serving(live, images=None, **options):
     async def project(request):
         return JSONResponse({"origin": studio.origin.tolist()})
 
-    def digests():
-        studio.bricks.update()
-        return {"project": studio.project.digest(), "shown": studio.bricks.digest()}
-
     async def digest(request):
-        return JSONResponse(await studio.do(digests))
+        return JSONResponse(await studio.do(studio.digests))
 
     async def socket(websocket):
         with contextlib.suppress(

@@ -6,7 +6,8 @@ import pytest
 from meshsdf.io import read_mesh
 from meshsdf.mesh import icosphere
 from meshsdf.mesh.primitives import box_mesh
-from meshsdf.server.wire_bricks import WireBricks, brick_records
+from meshsdf.server.wire_bricks import WireBricks
+from meshsdf.server.wire_records import brick_records
 from meshsdf.srgb import srgb_from_linear
 from meshsdf.texture import Brush, Project, VolumeTexture, paint
 from meshsdf.texture.layers import shown
@@ -30,7 +31,7 @@ def errors(texture, mesh, rng, n=10_000):
     """How far the page's colours are off, premultiplied and in sRGB; whether points are plain."""
     points, normals = surface_points(mesh, n, rng)
     wire = WireBricks(texture)
-    bricks = unpacked(wire.payload(wire.present))
+    bricks = unpacked(all_of(wire))
     slots = shown(texture).slots
     got, plain = page_colors(texture.octree, slots, bricks, points, normals)
     assert not np.isnan(got).any()
@@ -80,16 +81,16 @@ def test_updates_are_what_a_new_page_would_get_byte_for_byte(tmp_path, seed):
     project = Project.create(tmp_path / "a.mtex", small_mesh(), resolution=48)
     live = LiveStrokes(project)
     wire = WireBricks(project.texture)
-    bricks, n_sent = {}, 0
+    bricks, n_sent, versions = {}, 0, wire.pictures["base"].versions
     for number in range(N_OPERATIONS):
         layers = [layer.number for layer in project.texture.layers]
         history = project.history
         n_undone = len(history.steps) - history.n_done
         live.apply(random_operation(seed, number, layers, history.n_done, n_undone))
-        changed = wire.update()
-        before = wire.versions.copy()
-        for entry, version, brick in brick_records(wire.payload(changed)):
-            assert version == wire.versions[entry] == wire.revision
+        changed = wire.update()["base"]
+        before = versions.copy()
+        for entry, version, brick in brick_records(wire.pictures["base"].payload(changed)):
+            assert version == versions[entry] == wire.revision
             bricks[entry] = brick
         n_sent += len(changed)
         if number % 10 == 9:
@@ -98,14 +99,14 @@ def test_updates_are_what_a_new_page_would_get_byte_for_byte(tmp_path, seed):
             assert {e: b for e, b in bricks.items() if b[0]} == wanted
             assert fresh.digest() == wire.digest()
             fresh.release()
-        assert (wire.versions == before).all()
+        assert (versions == before).all()
     assert n_sent < N_OPERATIONS * len(wanted)  # not everything every time
     live.close()
 
 
 def all_of(wire):
     """The payload that a new page gets."""
-    return wire.payload(wire.present)
+    return wire.range_payload(0, wire.texture.octree.n_entries)
 
 
 def test_only_bricks_that_became_others_are_told():
@@ -115,13 +116,14 @@ def test_only_bricks_that_became_others_are_told():
     before = {entry: brick for entry, _, brick in brick_records(all_of(wire))}
     pole = np.array([[0.0, 0.0, 1.0]])
     paint(texture, layer, Brush(0.1, color=(1.0, 0.0, 0.0, 1.0)), pole, pole)
-    changed = wire.update()
-    assert 0 < len(changed) < len(wire.present)
-    told = {entry: brick for entry, _, brick in brick_records(wire.payload(changed))}
+    colors = wire.pictures["base"]
+    changed = wire.update()["base"]
+    assert 0 < len(changed) < len(colors.present)
+    told = {entry: brick for entry, _, brick in brick_records(colors.payload(changed))}
     assert all(before.get(entry) != brick for entry, brick in told.items())
     after = {entry: brick for entry, _, brick in brick_records(all_of(WireBricks(texture)))}
     assert told == {entry: after[entry] for entry in after if after[entry] != before.get(entry)}
-    assert len(wire.update()) == 0
+    assert [len(entries) for entries in wire.update().values()] == [0]
 
 
 def test_bricks_of_one_colour_are_sent_as_such():

@@ -14,7 +14,7 @@ from meshsdf.texture.symmetry import Symmetry
 SIZES = struct.Struct("<BBHIII")
 
 
-def frame(kind, payload=b"", *, seq=0, version=1, flags=0, length=None, checksum=None):
+def frame(kind, payload=b"", *, seq=0, version=2, flags=0, length=None, checksum=None):
     """A frame by the words of PROTOCOL.md, whose header may lie."""
     length = len(payload) if length is None else length
     checksum = zlib.crc32(payload) if checksum is None else checksum
@@ -23,7 +23,7 @@ def frame(kind, payload=b"", *, seq=0, version=1, flags=0, length=None, checksum
 
 def good_frames():
     """One frame of every type that goes up."""
-    hello = {"client": "0123456789abcdef" * 2, "version": 1, "run": "r", "since": 3}
+    hello = {"client": "0123456789abcdef" * 2, "version": 2, "run": "r", "since": 3}
     brush = Brush(0.1, symmetry=Symmetry(), stamp=np.ones((2, 3), np.float32)).to_dict()
     dab = struct.pack("<3f2h2H", 1.0, -2.0, 0.5, 32767, 0, 65535, 16)
     bake = {"kind": "bake", "params": {"layer": 0, "texture_kind": "checker"}, "replaces": True}
@@ -75,4 +75,24 @@ def painted(mesh, rng, *, n_layers, n_strokes=8, base="srgb8", texel=None, resol
                 kind="erase" if stroke % 4 == 3 else "paint",
             )
             paint(texture, layer, brush, points, normals)
+    return texture
+
+
+def with_relief(texture, mesh, rng, *, n_strokes=8, channels=("height", "normal")):
+    """Normals and heights beside the colours, on all layers: hard and soft, raised, dug, erased."""
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    for number in range(n_strokes * len(texture.layers)):
+        start, _ = surface_points(mesh, 1, rng)
+        points, normals = texture.on_surface(start + rng.normal(0, 0.02 * size, (4, 3)))
+        channel = channels[number % len(channels)]
+        brush = Brush(
+            size * float(rng.uniform(0.01, 0.1)),
+            hardness=float(rng.random()),
+            channel=channel,
+            color=(*rng.normal(size=3).tolist(), float(rng.random())),
+            value=float(rng.uniform(-8, 8)),
+            blend="add" if channel == "height" and number % 3 else "normal",
+            kind="erase" if number % 7 == 6 else "paint",
+        )
+        paint(texture, texture.layers[number % len(texture.layers)], brush, points, normals)
     return texture

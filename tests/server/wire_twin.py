@@ -7,14 +7,17 @@ import itertools
 
 import numpy as np
 
-from meshsdf.server.wire_bricks import brick_records
+from meshsdf.server.wire_records import brick_records
 from meshsdf.srgb import linear_from_srgb
 
 ABSENT, NO_ENTRY, FIRST_GROUP = -1, -1, -3
 
 
-def unpacked(payload):
-    """Bricks of a BRICKS payload: entry -> (9, 9, 9, 4) premultiplied linear, NaN where unsent."""
+def unpacked(payload, picture="base"):
+    """Bricks of a BRICKS payload: entry -> (9, 9, 9, 4) numbers times the last, NaN where unsent.
+
+    That is alpha or coverage; colours are linear.
+    """
     bricks = {}
     for entry, _, brick in brick_records(payload):
         state, n = brick[0], int.from_bytes(brick[2:4], "little")
@@ -28,10 +31,22 @@ def unpacked(payload):
             sent = np.unpackbits(np.frombuffer(brick[4:96], np.uint8), bitorder="little")[:729] > 0
             codes = np.frombuffer(brick[96:], np.uint8).reshape(n, 4)
         nodes = np.full((729, 4), np.nan)
-        nodes[sent, :3] = linear_from_srgb(codes[:, :3] / 255)
-        nodes[sent, 3] = codes[:, 3] / 255
+        nodes[sent] = numbers_of(codes, picture)
         bricks[entry] = nodes.reshape(9, 9, 9, 4)
     return bricks
+
+
+def numbers_of(codes, picture):
+    """(n, 4) numbers that (n, 4) bytes stand for, by the words of PROTOCOL.md."""
+    out = np.zeros((len(codes), 4))
+    if picture == "height":
+        half, coverage = codes.copy().view("<f2"), codes.copy().view("<u2")
+        out[:, 0], out[:, 3] = half[:, 0], coverage[:, 1] / 65535
+        return out
+    low = codes[:, :3]
+    out[:, :3] = linear_from_srgb(low / 255) if picture == "base" else low.view(np.int8) / 127
+    out[:, 3] = codes[:, 3] / 255
+    return out
 
 
 def found_entries(tables, level, bricks, normals):
@@ -52,17 +67,18 @@ def found_entries(tables, level, bricks, normals):
 
 
 def page_colors(octree, slots, bricks, points, normals):
-    """(n, 4) premultiplied linear colours at points, and which points are plain.
+    """(n, 4) numbers at points, still multiplied by the last, and which points are plain.
 
-    A point is plain if it is clear whose texels the corners of its cell are: its entry's sheet has
-    them all. Where the next brick has several sheets and this one has not, just the sheet that the
-    point's normal chooses has them; and if some are not stored, a sheet is not two a level above.
+    Where no brick was sent they are NaN. A point is plain if it is clear whose texels the corners
+    of its cell are: its entry's sheet has them all. Where the next brick has several sheets and
+    this one has not, just the sheet that the point's normal chooses has them; and if some are not
+    stored, a sheet is not two a level above.
     """
     out, plain = np.full((len(points), 4), np.nan), np.zeros(len(points), bool)
     tables = octree.tables
     sent = np.full(octree.n_entries + 1, -1)  # the last answers for NO_ENTRY
     sent[list(bricks)] = np.arange(len(bricks))
-    nodes = np.stack(list(bricks.values()))
+    nodes = np.array(list(bricks.values())).reshape(-1, 9, 9, 9, 4)
     waiting = np.arange(len(points))
     for level in range(octree.n_levels):
         places = points[waiting] / octree.spacing(level)
