@@ -10,6 +10,7 @@ import pytest
 from meshsdf.kernels.blending import MODES
 from meshsdf.mesh.primitives import icosphere
 from meshsdf.server.client import Painter
+from meshsdf.server.wire_records import brick_records
 from meshsdf.texture.brush import Brush
 from meshsdf.texture.procedural import PROCEDURALS
 from meshsdf.texture.sdf_patterns import ON_SHAPE
@@ -131,13 +132,39 @@ def test_what_a_page_has_already_is_not_sent_again(server, path):
 
 @pytest.mark.parametrize(
     "asked", ["", "?first=0", "?first=5&last=4", "?first=-1&last=4", "?first=0&last=99999999999",
-              "?first=0&last=5000", "?first=a&last=b", "?first=١&last=٢"],
+              "?first=0&last=5000", "?first=a&last=b", "?first=١&last=٢",
+              "?first=0&last=9&picture=mask", "?first=0&last=9&picture="],
 )  # fmt: skip
 def test_ranges_that_make_no_sense_are_refused(server, asked):
     with server.client() as client:
         answer = client.get(f"/api/bricks{asked}")
     assert answer.status_code == 400
     assert set(answer.json()) == {"what", "where", "fix"}
+
+
+def test_bricks_of_every_picture_are_to_be_had(tmp_path):
+    pole = np.array([[0.0, 0.0, 1.0]])
+    with running(tmp_path) as server, server.client() as client:
+        facts = client.get("/api/project").json()
+        assert facts["pictures"] == ["base", "normal", "height"]
+        assert facts["displays"] == ["color", "normal", "displacement"]
+        with Painter(f"{server.base}/#t={server.gate.token}") as painter:
+            painter.begin(0, Brush(0.3, channel="height", value=2.0))
+            painter.dabs(pole, pole)
+            painter.end()
+            painter.catch_up()
+            held = painter.pictures
+        for picture, asked in (
+            ("base", ""),
+            ("base", "base"),
+            ("height", "height"),
+            ("normal", "normal"),
+        ):
+            query = {"first": 0, "last": facts["entries"]} | ({"picture": asked} if asked else {})
+            payload = client.get("/api/bricks", params=query).content
+            told = {entry: brick for entry, _, brick in brick_records(payload)}
+            assert told == {entry: brick for entry, brick in held[picture].items() if brick[0]}
+            assert bool(told) == (picture != "normal")
 
 
 def test_what_is_not_there_is_said_in_json(server):

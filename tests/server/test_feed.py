@@ -5,14 +5,16 @@ import struct
 import numpy as np
 from numpy.testing import assert_array_equal
 
+from meshsdf.kernels.wire_codes import PICTURES
 from meshsdf.mesh import icosphere
-from meshsdf.server.feed import MOST_BYTES, MOST_RECORDS, Feed
+from meshsdf.server import feed as feed_module
+from meshsdf.server.feed import MOST_BYTES, MOST_RECORDS, MOST_UNDER_WAY, Feed
 from meshsdf.server.messages import COMPLETE, decode
 from meshsdf.server.wire_bricks import WireBricks
 from meshsdf.server.wire_records import brick_records
 from meshsdf.texture import Brush, VolumeTexture, paint
 
-from .wire_examples import painted, surface_points
+from .wire_examples import painted, surface_points, with_relief
 
 
 def example(resolution=48, n_strokes=8):
@@ -23,9 +25,9 @@ def example(resolution=48, n_strokes=8):
     return texture, WireBricks(texture), mesh, rng
 
 
-def all_of(wire):
-    """The payload of all colours."""
-    return wire.range_payload(0, wire.texture.octree.n_entries)
+def all_of(wire, picture="base"):
+    """The payload of all bricks of a picture."""
+    return wire.range_payload(0, wire.texture.octree.n_entries, picture)
 
 
 def n_bricks(wire):
@@ -33,11 +35,12 @@ def n_bricks(wire):
     return len(wire.pictures["base"].present)
 
 
-def dab(texture, mesh, rng, radius=0.05):
+def dab(texture, mesh, rng, radius=0.05, channel="base"):
     """Paint somewhere."""
     points, normals = surface_points(mesh, 1, rng)
-    color = tuple(rng.random(3).tolist())
-    paint(texture, texture.layers[0], Brush(radius, color=(*color, 1.0)), points, normals)
+    color, value = tuple(rng.random(3).tolist()), float(rng.uniform(1, 4))
+    brush = Brush(radius, color=(*color, 1.0), channel=channel, value=value)
+    paint(texture, texture.layers[0], brush, points, normals)
     return points[0]
 
 
@@ -45,7 +48,8 @@ class Page:
     """What a page would hold: the bricks of all frames that it was sent."""
 
     def __init__(self, wire, **known):
-        self.frames, self.bricks, self.versions = [], {}, {}
+        self.frames, self.pictures = [], {picture: ({}, {}) for picture in PICTURES}
+        self.bricks, self.versions = self.pictures["base"]
         self.feed = Feed(wire, self.frames.append, **known)
 
     def take(self, *, answer=True):
@@ -55,9 +59,10 @@ class Page:
         message = decode(frame, downward=True)
         records = list(brick_records(message.body))
         assert len(records) == struct.unpack_from("<I", message.body)[0]
+        bricks, versions = self.pictures[PICTURES[message.flags >> 1]]
         for entry, version, brick in records:
-            assert version > self.versions.get(entry, 0)
-            self.bricks[entry], self.versions[entry] = brick, version
+            assert version > versions.get(entry, 0)
+            bricks[entry], versions[entry] = brick, version
         if answer:
             self.feed.shown(message.seq)
         return message, [entry for entry, _, _ in records]
@@ -73,8 +78,11 @@ class Page:
 
     def shows(self, wire):
         """Whether this is what a new page would get."""
-        wanted = {entry: brick for entry, _, brick in brick_records(all_of(wire))}
-        return {e: b for e, b in self.bricks.items() if b[0]} == wanted
+        return all(
+            {e: b for e, b in bricks.items() if b[0]}
+            == {entry: brick for entry, _, brick in brick_records(all_of(wire, picture))}
+            for picture, (bricks, _) in self.pictures.items()
+        )
 
 
 def test_a_new_page_gets_everything_coarse_levels_first():
@@ -172,3 +180,68 @@ def test_a_page_is_told_that_it_has_everything_even_if_there_is_nothing():
     assert message.flags == COMPLETE
     page.feed.refill()
     assert not page.frames
+
+
+def test_every_message_is_of_one_picture_and_colours_come_before_relief():
+    texture, _, mesh, rng = example(resolution=96, n_strokes=25)
+    with_relief(texture, mesh, rng)
+    wire = WireBricks(texture)
+    page = Page(wire)
+    page.feed.refill()
+    order, n_sent = [], 0
+    n_all = sum(len(picture.present) for picture in wire.pictures.values())
+    while page.frames:
+        assert len(page.frames) <= MOST_UNDER_WAY
+        message, entries = page.take()
+        order.append(message.flags >> 1)
+        n_sent += len(entries)
+        assert bool(message.flags & COMPLETE) == (n_sent == n_all)
+        page.feed.refill()
+    assert order == sorted(order)
+    assert set(order) == {0, 1, 2}
+    assert page.shows(wire)
+
+
+def test_what_changed_in_any_picture_comes_before_what_a_page_never_had(monkeypatch):
+    monkeypatch.setattr(feed_module, "MOST_BYTES", MOST_BYTES // 8)
+    texture, wire, mesh, rng = example(resolution=96, n_strokes=25)
+    page = Page(wire)
+    page.feed.refill()
+    page.take(answer=False)
+    dab(texture, mesh, rng, channel="height")
+    told = wire.update()
+    assert len(told["height"])
+    while page.frames:
+        page.take()
+    page.feed.shown(1)
+    page.feed.refill()
+    flags = []
+    while page.frames:
+        message, entries = page.take()
+        flags.append(message.flags)
+        if message.flags >> 1 == 2:
+            assert set(told["height"].tolist()) <= set(entries)
+        page.feed.refill()
+    # Colours that came to be stored, then heights, then the other colours
+    assert [one >> 1 for one in flags[:2]] == [0, 2]
+    assert {one >> 1 for one in flags[2:]} == {0}
+    assert flags[-1] == COMPLETE
+    assert page.shows(wire)
+
+
+def test_a_page_that_comes_back_gets_what_is_newer_in_every_picture():
+    texture, wire, mesh, rng = example()
+    dab(texture, mesh, rng, channel="height")
+    wire.update()
+    page = Page(wire)
+    page.take_all()
+    since = max(max(versions.values()) for _, versions in page.pictures.values() if versions)
+    dab(texture, mesh, rng, channel="height")
+    dab(texture, mesh, rng, channel="normal")
+    changed = wire.update()
+    back = Page(wire, run_is_known=True, since=since)
+    assert back.take_all().flags & COMPLETE
+    for picture, (bricks, _) in back.pictures.items():
+        assert_array_equal(sorted(bricks), changed[picture])
+        page.pictures[picture][0].update(bricks)
+    assert page.shows(wire)

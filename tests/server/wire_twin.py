@@ -18,8 +18,14 @@ def unpacked(payload, picture="base"):
 
     That is alpha or coverage; colours are linear.
     """
+    told = ((entry, brick) for entry, _, brick in brick_records(payload))
+    return unpacked_bricks(told, picture)
+
+
+def unpacked_bricks(told, picture):
+    """The same of (entry, brick) pairs."""
     bricks = {}
-    for entry, _, brick in brick_records(payload):
+    for entry, brick in told:
         state, n = brick[0], int.from_bytes(brick[2:4], "little")
         if state == 0:
             bricks.pop(entry, None)
@@ -47,6 +53,43 @@ def numbers_of(codes, picture):
     out[:, :3] = linear_from_srgb(low / 255) if picture == "base" else low.view(np.int8) / 127
     out[:, 3] = codes[:, 3] / 255
     return out
+
+
+def codes_of(numbers, picture):
+    """(n,) uint32 codes of (n, 4) float32 numbers of a texture, by the words of PROTOCOL.md."""
+    told = numbers[:, :3] * numbers[:, 3:]
+    if picture == "height":
+        halves = told[:, :1].astype("<f2") + np.float16(0)  # no -0
+        coverage = np.rint(65535 * numbers[:, 3:]).astype("<u2")
+        return np.hstack([halves.view("<u2"), coverage]).view("<u4")[:, 0]
+    steps = np.floor(127 * told.astype(np.float64) + 0.5).astype(np.int8).view(np.uint8)
+    coverage = np.floor(255 * numbers[:, 3:].astype(np.float64) + 0.5).astype(np.uint8)
+    return np.hstack([steps, coverage]).view("<u4")[:, 0]
+
+
+def hiding(octree, present, saying):
+    """Entries whose brick says nothing, but must hide that a coarser one says something.
+
+    ``present`` are the entries that have a brick, ``saying`` those whose brick says something.
+    Nothing is hidden where the brick above is there on all sheets and says nothing; where it is
+    there on some of them, the one above that decides, too.
+    """
+    tables = octree.tables
+    sheets = {}
+    for entry, (level, brick) in enumerate(zip(tables.levels.tolist(), tables.bricks, strict=True)):
+        sheets.setdefault((level, *brick.tolist()), set()).add(entry)
+    found = set()
+    for entry in present - saying:
+        level, brick = int(tables.levels[entry]), tables.bricks[entry]
+        goes_on = True
+        while goes_on and level + 1 < octree.n_levels:
+            level, brick = level + 1, brick >> 1
+            above = sheets.get((level, *brick.tolist()), set())
+            if above & saying or not above & present:
+                found.add(entry)
+                break
+            goes_on = not above <= present
+    return found
 
 
 def found_entries(tables, level, bricks, normals):
