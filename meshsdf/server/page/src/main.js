@@ -15,6 +15,7 @@ import { historyCard } from "./ui/history_card.js";
 import { ImageCard, projectionKinds } from "./ui/image_card.js";
 import { shortcutTable } from "./ui/keys.js";
 import { layersCard } from "./ui/layers_card.js";
+import { legend } from "./ui/legend.js";
 import { banner, progress, toasts, watchFatal } from "./ui/notices.js";
 import { PatternCard } from "./ui/pattern_card.js";
 import { quickBar } from "./ui/quick_bar.js";
@@ -96,7 +97,7 @@ function build(session, viewer) {
   const table = shortcutTable(store, actions, viewer, open);
   const help = helpDialog(table);
   root.append(bar.node, side, help.node);
-  stage.append(toolbar(store), statusLine(store), quickBar(store, panels));
+  stage.append(toolbar(store), statusLine(store), quickBar(store, panels), legend(store));
   listen(table);
   if (image) takeDrops((file) => image.take(file));
   canvas.addEventListener("pointerdown", () => NARROW.matches && showSide(false));

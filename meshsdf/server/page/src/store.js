@@ -36,6 +36,7 @@
  * @property {string} show which of the facts' displays
  * @property {boolean} lit
  * @property {boolean} wireframe
+ * @property {boolean} relief whether heights and normals are seen as such
  * @property {"paint" | "orbit"} drag what the left button or one finger does
  * @property {"" | "source"} aim what the next tap sets
  */
@@ -47,6 +48,7 @@
  * @property {Vec3} point
  * @property {Vec3} normal
  * @property {number} [spacing] of the texels stored there, world units
+ * @property {number} [height] finest texels
  */
 
 /**
@@ -61,6 +63,7 @@
  * @property {number} layer
  * @property {import("./tool.js").Tool | null} tool
  * @property {View} view
+ * @property {number} reach largest height there is, finest texels
  * @property {Cursor | null} cursor
  * @property {boolean} stroking
  * @property {object | null} placing
@@ -87,7 +90,8 @@ const EMPTY = {
   unackedStrokes: 0,
   layer: -1,
   tool: null,
-  view: { show: "color", lit: true, wireframe: false, drag: "paint", aim: "" },
+  view: { show: "color", lit: true, wireframe: false, relief: true, drag: "paint", aim: "" },
+  reach: 0,
   cursor: null,
   stroking: false,
   placing: null,

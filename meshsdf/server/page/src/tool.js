@@ -1,6 +1,7 @@
 /** What the hand holds: brush kind, size, colours; and how that becomes a brush on the wire. */
 
 /** @typedef {import("./store.js").Vec3} Vec3 */
+/** @typedef {"base" | "height" | "mask"} Channel */
 
 /**
  * @typedef {object} Tool
@@ -16,8 +17,12 @@
  * @property {boolean} pressure_flow whether pressure makes dabs weaker
  * @property {Vec3} color linear
  * @property {Vec3} end_color linear; the other of the two colours, and what a gradient ends in
- * @property {string} channel "base" or "mask"
+ * @property {Channel} channel what is painted on
  * @property {number} value painted into a mask
+ * @property {number} amount of heights, finest texels; below 0 goes in
+ * @property {boolean} adds whether heights are added to those below, or put in their place
+ * @property {Partial<Record<Channel, Partial<Pick<Tool, "radius" | "hardness">>>>} hands sizes that
+ *     were last used on the other channels
  * @property {string} blend
  * @property {{mirror: string, radial: number, axis: string, center: Vec3}} symmetry in the mesh's own coordinates
  * @property {boolean} geodesic
@@ -31,7 +36,7 @@ export const KINDS = ["paint", "erase", "blur", "smudge", "clone", "fill", "grad
 /** Kinds that lay dabs of a size. */
 export const DABBING = ["paint", "erase", "blur", "smudge", "clone"];
 
-/** Kinds that lay the chosen colour, so that a blend mode and a channel mean something. */
+/** Kinds that lay the chosen colour or height, so that it means something how. */
 export const COLORING = ["paint", "fill", "gradient"];
 
 /** @type {Tool} */
@@ -50,6 +55,9 @@ export const FIRST_TOOL = {
   end_color: [0.8714, 0.8228, 0.7157],
   channel: "base",
   value: 0,
+  amount: 1,
+  adds: true,
+  hands: { height: { hardness: 0.2 } },
   blend: "normal",
   symmetry: { mirror: "", radial: 1, axis: "y", center: [0, 0, 0] },
   geodesic: false,
@@ -135,28 +143,71 @@ const RISING = [[0, 0.1], [1, 1]]; // prettier-ignore
  * @returns {Record<string, any>}
  */
 export function brushOf(tool) {
-  const colors = COLORING.includes(tool.kind);
+  const { channel } = tool;
+  const lays = COLORING.includes(tool.kind);
+  const isHeight = channel === "height";
+  const ofHeight = tool.adds ? "add" : "normal";
   return {
     kind: tool.kind,
     radius: tool.radius,
     hardness: tool.hardness,
     falloff: tool.falloff,
     flow: tool.flow,
-    opacity: tool.opacity,
+    opacity: isHeight && lays ? 1 : tool.opacity, // the amount says it all
     build_up: tool.build_up,
     spacing: tool.spacing,
     pressure_radius: tool.pressure_radius ? RISING : EVEN,
     pressure_flow: tool.pressure_flow ? RISING : EVEN,
     color: [...tool.color, 1],
-    end_color: [...tool.end_color, 1],
-    channel: colors ? tool.channel : "base",
-    value: tool.value,
-    blend: colors && tool.channel === "base" ? tool.blend : "normal",
+    end_color: [...(channel === "base" ? tool.end_color : endOf(tool)), 1],
+    channel,
+    value: isHeight ? tool.amount : tool.value,
+    blend: lays && channel !== "mask" ? (isHeight ? ofHeight : tool.blend) : "normal",
     symmetry: tool.symmetry,
     geodesic: tool.geodesic,
     tolerance: tool.tolerance,
     shape: tool.shape,
   };
+}
+
+/**
+ * What a gradient of another channel than colour ends in: the surface as it was, or the other mask.
+ *
+ * @param {Tool} tool
+ * @returns {Vec3}
+ */
+function endOf({ channel, value }) {
+  const end = channel === "mask" ? 1 - value : 0;
+  return [end, end, end];
+}
+
+/**
+ * Paint on another channel, with the size that was last used there.
+ *
+ * @param {import("./store.js").Store} store
+ * @param {Channel} channel
+ */
+export function takeChannel(store, channel) {
+  const { tool, view } = store.get();
+  if (!tool || tool.channel === channel) return;
+  const { radius, hardness, hands } = tool;
+  const others = { ...hands, [tool.channel]: { radius, hardness } };
+  setTool(store, { channel, hands: others, ...hands[channel] });
+  // What is painted should be seen
+  if (channel === "height" && !view.relief) store.set({ view: { ...view, relief: true } });
+}
+
+/**
+ * Channels that can be painted and seen.
+ *
+ * @param {import("./store.js").Facts | null} facts
+ * @returns {Channel[]}
+ */
+export function channels(facts) {
+  const known = facts?.brush?.channels ?? ["base", "mask"];
+  const isSeen = facts?.displays?.includes("displacement") ?? false;
+  const all = /** @type {Channel[]} */ (["base", "height", "mask"]);
+  return all.filter((one) => known.includes(one) && (one !== "height" || isSeen));
 }
 
 /**

@@ -25,10 +25,10 @@ test("the checksum is the CRC-32 of its definition, whatever the length", () => 
 
 test("a frame is the header of the protocol and its payload", () => {
   const frame = protocol.encodeFrame(UP.STROKE_END, 7);
-  assert.deepEqual(frame, bytes("04010000 07000000 00000000 00000000"));
+  assert.deepEqual(frame, bytes("04020000 07000000 00000000 00000000"));
   const payload = Buffer.from("123456789");
   const long = protocol.encodeFrame(DOWN.ACK, 0x01020304, payload);
-  assert.deepEqual(long.subarray(0, 16), bytes("41010000 04030201 09000000 2639f4cb"));
+  assert.deepEqual(long.subarray(0, 16), bytes("41020000 04030201 09000000 2639f4cb"));
   const back = protocol.decodeFrame(long);
   assert.deepEqual([back.type, back.flags, back.seq], [DOWN.ACK, 0, 0x01020304]);
   assert.deepEqual(back.payload, Uint8Array.from(payload));

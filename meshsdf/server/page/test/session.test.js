@@ -25,7 +25,7 @@ class Server {
     if (type === UP.HELLO) {
       line.client = decodeJson(payload).client;
       const state = { seq: 0, layers: [], history: { done: [], undone: [] }, painters: 1, saved: 0 };
-      const welcome = { version: 1, run: "r", cseq: this.last.get(line.client) ?? 0, state };
+      const welcome = { version: 2, run: "r", cseq: this.last.get(line.client) ?? 0, state };
       return line.say(encodeFrame(DOWN.WELCOME, 0, encodeJson(welcome)));
     }
     if (type === UP.VIEW) return void (this.views += 1);

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { createStore } from "../src/store.js";
-import { brushOf, firstTool, keptOf, pickColor, radiusRange, setSource } from "../src/tool.js";
+import { brushOf, channels, firstTool, keptOf, pickColor, radiusRange, setSource, setTool, takeChannel } from "../src/tool.js";
 import { shareOf } from "../src/ui/keys.js";
 import { limited, mirrored } from "../src/ui/symmetry_rows.js";
 
@@ -39,9 +39,43 @@ test("a brush has four numbers a colour, and blends only where it lays colour", 
   assert.equal(brushOf({ ...tool, channel: "base" }).blend, "multiply");
   assert.equal(brushOf(tool).blend, "normal");
   assert.equal(brushOf(tool).channel, "mask");
-  assert.equal(brushOf({ ...tool, kind: "erase" }).channel, "base");
+  assert.equal(brushOf({ ...tool, channel: "base", blend: "multiply", kind: "erase" }).blend, "normal");
   assert.equal(brushOf(tool).color.length, 4);
   assert.ok(!("source" in brushOf(tool)));
+});
+
+test("heights are added up to an amount, or brought to it, and a gradient runs out level", () => {
+  const tool = { ...firstTool(facts), channel: "height", amount: -2, opacity: 0.5, blend: "multiply" };
+  const { channel, value, blend, opacity } = brushOf(tool);
+  assert.deepEqual([channel, value, blend, opacity], ["height", -2, "add", 1]);
+  assert.equal(brushOf({ ...tool, adds: false }).blend, "normal");
+  const eraser = brushOf({ ...tool, kind: "erase" });
+  assert.deepEqual([eraser.channel, eraser.blend, eraser.opacity], ["height", "normal", 0.5]);
+  assert.equal(brushOf({ ...tool, kind: "gradient" }).end_color[0], 0);
+  assert.equal(brushOf({ ...tool, kind: "gradient", channel: "mask", value: 0 }).end_color[0], 1);
+});
+
+test("every channel has its own size and hardness, and heights are painted to be seen", () => {
+  const store = createStore({ tool: firstTool(facts) });
+  const tool = () => /** @type {import("../src/tool.js").Tool} */ (store.get().tool);
+  store.set({ view: { ...store.get().view, relief: false } });
+  const before = tool();
+  takeChannel(store, "height");
+  assert.ok(tool().hardness < before.hardness);
+  assert.ok(store.get().view.relief);
+  setTool(store, { radius: 3, hardness: 0.9 });
+  takeChannel(store, "base");
+  assert.deepEqual([tool().radius, tool().hardness], [before.radius, before.hardness]);
+  takeChannel(store, "height");
+  assert.deepEqual([tool().radius, tool().hardness], [3, 0.9]);
+});
+
+test("only channels that the server paints and shows are offered", () => {
+  const brush = { channels: ["base", "normal", "height", "orm", "mask"] };
+  assert.deepEqual(channels({ brush }), ["base", "mask"]);
+  const displays = ["color", "normal", "displacement"];
+  assert.deepEqual(channels({ brush, displays }), ["base", "height", "mask"]);
+  assert.deepEqual(channels({ brush: { channels: ["base"] }, displays }), ["base"]);
 });
 
 test("pressure bends its curve only where it is asked to", () => {

@@ -2,9 +2,11 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { valueOf } from "../src/keep.js";
+import { signedNumber } from "../src/ui/channel_rows.js";
 import { plainNumber, sentence } from "../src/ui/controls.js";
 import { bytesWords } from "../src/ui/export_menu.js";
 import { connectionWords, sentenceOf } from "../src/ui/notices.js";
+import { legendRows } from "../src/ui/legend.js";
 import { rangeOf } from "../src/ui/parameter_fields.js";
 import { fineWords, savedWords } from "../src/ui/status_line.js";
 
@@ -21,6 +23,18 @@ test("saved is what was acknowledged, and no more", () => {
     savedWords({ ...calm, unacked: 9, unackedStrokes: 3 }),
     /^Saved up to stroke 12, 3 under way/,
   );
+});
+
+test("heights say which way they go, in texels and in the model's lengths", () => {
+  assert.deepEqual([2.5, -0.125, 0].map(signedNumber), ["+2.5", "\u22120.125", "0"]);
+  assert.deepEqual(legendRows(4, { texel: 0.01, units: "mm" }), [
+    ["+4 texels", "+0.04 mm"],
+    ["0", ""],
+    ["\u22124 texels", "\u22120.04 mm"],
+  ]);
+  assert.equal(legendRows(0, { texel: 0.01 }).length, 1);
+  const cursor = { spacing: 0.02, height: -1.5 };
+  assert.match(fineWords({ facts: { texel: 0.01 }, tool: null, cursor }), /^Height \u22121\.5 texels {2}·  Texel 0\.02 here$/);
 });
 
 test("a lost connection says how many strokes are kept", () => {

@@ -1,5 +1,5 @@
 /**
- * The frames of the socket, version 1: a header of 16 bytes, then the payload, little endian.
+ * The frames of the socket, version 2: a header of 16 bytes, then the payload, little endian.
  *
  * `type u8, version u8, flags u16, seq u32, length u32, crc32 u32`; see PROTOCOL.md of the server.
  */
@@ -7,7 +7,7 @@
 import { crc32 } from "./crc32.js";
 import { encodeOctahedral } from "./octahedral.js";
 
-export const VERSION = 1;
+export const VERSION = 2;
 export const COMPLETE = 1; // flag of BRICKS: whoever got this has everything
 export const HEADER = 16;
 export const DAB = 20;
@@ -33,6 +33,11 @@ export const DOWN = /** @type {const} */ ({
   STATE: 67,
   ERROR: 68,
 });
+
+/** Pictures of a texture, by their numbers on the wire. */
+export const PICTURES = /** @type {const} */ (["base", "normal", "height"]);
+
+/** @typedef {(typeof PICTURES)[number]} PictureName */
 
 const EMPTY = new Uint8Array(0);
 
@@ -75,6 +80,18 @@ export function decodeFrame(data) {
   if (view.getUint32(12, true) !== crc32(payload)) throw new FrameError("the checksum is wrong");
   const flags = view.getUint16(2, true);
   return { type: view.getUint8(0), flags, seq: view.getUint32(4, true), payload };
+}
+
+/**
+ * Which picture the bricks of a message belong to.
+ *
+ * @param {number} flags of BRICKS
+ * @returns {PictureName}
+ */
+export function pictureOf(flags) {
+  const name = PICTURES[(flags >> 1) & 3];
+  if (!name) throw new FrameError(`there is no picture ${(flags >> 1) & 3}`);
+  return name;
 }
 
 /** @param {any} value */
@@ -140,7 +157,7 @@ export const TEXELS = 2;
  * @property {number} entry
  * @property {number} version
  * @property {number} state ABSENT, UNIFORM or TEXELS
- * @property {Uint8Array} data of UNIFORM its RGBA; of TEXELS the mask, then RGBA of each node in it
+ * @property {Uint8Array} data of UNIFORM its four bytes; of TEXELS the mask, then four for each node in it
  */
 
 /**

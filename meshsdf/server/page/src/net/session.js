@@ -4,15 +4,18 @@
  */
 
 import { toast } from "../store.js";
+import { ELSEWHERE, NO_KEY, OTHER_PROJECT, REFUSED } from "../troubles.js";
 import { ApiError, requestJson, tradeToken, uploadImage } from "./api.js";
 import { claim, newClient, tabStorage } from "./identity.js";
 import { Link } from "./link.js";
-import { COMPLETE, DOWN, FrameError, UP, VERSION, decodeBricks, decodeJson, encodeDabs, encodeFrame, encodeJson, encodeView } from "./protocol.js"; // prettier-ignore
+import { COMPLETE, DOWN, FrameError, UP, VERSION, decodeBricks, decodeJson, encodeDabs, encodeFrame, encodeJson, encodeView, pictureOf } from "./protocol.js"; // prettier-ignore
 import { Queue } from "./queue.js";
 import { Seen } from "./seen.js";
 
 /** @typedef {import("../store.js").Store} Store */
 /** @typedef {import("./protocol.js").Brick} Brick */
+/** @typedef {import("./protocol.js").PictureName} PictureName */
+/** @typedef {(bricks: Brick[], picture: PictureName) => void} BrickListener */
 /** @typedef {import("./protocol.js").Sample} Sample */
 
 const DELAYS = [250, 500, 1000, 2000, 4000]; // milliseconds before the tries to come back
@@ -20,23 +23,6 @@ const VIEW_PAUSE = 100; // between two words on where the eye is
 const DABS_PER_MESSAGE = 256;
 const MOST_REFUSALS = 5; // closings in a row in which nothing was acknowledged
 const SAME = ["name", "entries", "texel", "origin", "faces"]; // what tells projects apart
-
-const NO_KEY = {
-  what: "this page's key is not valid",
-  fix: "open the address that `meshsdf paint` printed",
-};
-const ELSEWHERE = {
-  what: "this page was opened once more, and paints there now",
-  fix: "reload the page to paint here",
-};
-const REFUSED = {
-  what: "the server refuses what this page sends",
-  fix: "reload the page; what was not saved is kept until then",
-};
-const OTHER_PROJECT = {
-  what: "another project is served here now",
-  fix: "reload the page to paint on it; what was not saved belongs to the first one",
-};
 
 /**
  * @typedef {object} Session
@@ -49,7 +35,7 @@ const OTHER_PROJECT = {
  * @property {() => void} redo
  * @property {(kind: string, params: Record<string, any>, replaces?: boolean) => number} operation
  * @property {(eye: readonly number[], cursor: readonly number[] | null) => void} view
- * @property {(fn: (bricks: Brick[]) => void) => void} onBricks called at once with every message
+ * @property {(fn: BrickListener) => void} onBricks called at once with every message
  * @property {(blob: Blob) => Promise<{id: string, width: number, height: number}>} upload
  * @property {(name: string) => Promise<any>} export
  * @property {() => void} close
@@ -70,7 +56,7 @@ class Wire {
     this.queue = new Queue(tabStorage(), newClient);
     /** @type {Link | null} */
     this.link = null;
-    /** @type {((bricks: Brick[]) => void)[]} */
+    /** @type {BrickListener[]} */
     this.brickListeners = [];
     /** @type {Promise<import("../store.js").Facts>} */
     this.ready = new Promise((resolve) => (this.resolveReady = resolve));
@@ -227,7 +213,7 @@ class Wire {
     if (type === DOWN.ACK) this.#acknowledged(seq, payload);
     else if (type === DOWN.BRICKS) {
       const bricks = decodeBricks(payload);
-      for (const fn of this.brickListeners) fn(bricks);
+      for (const fn of this.brickListeners) fn(bricks, pictureOf(flags));
       this.seen.add(bricks, (flags & COMPLETE) !== 0);
       this.link?.send(encodeFrame(UP.SHOWN, seq));
     } else if (type === DOWN.STATE) this.#setState(decodeJson(payload));

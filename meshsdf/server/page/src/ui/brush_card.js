@@ -2,6 +2,7 @@
 
 import { COLORING, DABBING, radiusRange, setTool } from "../tool.js";
 import { card } from "./card.js";
+import { channelRow, layRows } from "./channel_rows.js";
 import { bar, button, choice, PERCENT, plainNumber, select, sentence, toggle } from "./controls.js";
 import { element } from "./element.js";
 import { symmetryRows } from "./symmetry_rows.js";
@@ -16,12 +17,14 @@ const ALL = [...DABBING, "fill", "gradient"];
 /** @param {Store} store */
 export function brushCard(store) {
   const numbers = numberRows(store);
-  const [choices, channels] = choiceRows(store);
+  const channel = channelRow(store);
+  const lays = layRows(store);
+  const choices = choiceRows(store);
   const [mirror, turns] = symmetryRows(store).map((row) => ({ ...row, kinds: [...DABS, "fill"] }));
   /** @type {Row[]} */
-  const rows = [...numbers, ...choices, mirror];
+  const rows = [channel, ...lays, ...numbers, ...choices, mirror];
   /** @type {Row[]} */
-  const more = [...channels, turns, ...moreRows(store)];
+  const more = [turns, ...moreRows(store)];
   // Hardness and flow are set less often, so they share a row
   const pair = element(
     "div",
@@ -42,6 +45,8 @@ export function brushCard(store) {
     { name: "brush", title: "Brush" },
     hint,
     aim,
+    channel.node,
+    ...lays.map((row) => row.node),
     ...numbers.slice(0, -2).map((row) => row.node),
     pair,
     ...[...choices, mirror].map((row) => row.node),
@@ -99,33 +104,22 @@ function numberRows(store) {
   const flow = share("flow", "How much one touch lays on  ·  Shift 0 to 9");
   return [
     { node: size.node, kinds: DABS, show: (now) => size.set(now.radius) },
-    { node: opacity.node, kinds: ALL, show: (now) => opacity.set(now.opacity) },
+    {
+      node: opacity.node,
+      kinds: ALL,
+      needs: (now) => now.channel !== "height" || !COLORING.includes(now.kind),
+      show: (now) => opacity.set(now.opacity),
+    },
     { node: tolerance.node, kinds: ["fill"], show: (now) => tolerance.set(now.tolerance) },
     { node: hardness.node, kinds: DABS, show: (now) => hardness.set(now.hardness) },
     { node: flow.node, kinds: DABS, show: (now) => flow.set(now.flow) },
   ];
 }
 
-/** @param {Store} store @returns {[Row[], Row[]]} always seen, and seldom */
+/** @param {Store} store @returns {Row[]} */
 function choiceRows(store) {
   const tool = /** @type {Tool} */ (store.get().tool);
   const modes = blendModes(store.get().facts);
-  const channel = choice({
-    label: "Paint on", value: tool.channel,
-    choices: [
-      { value: "base", label: "Colour", tip: "Paint the layer's colour" },
-      { value: "mask", label: "Mask", tip: "Paint how much of the layer is shown" },
-    ],
-    onchange: (value) => setTool(store, { channel: value }),
-  }); // prettier-ignore
-  const reveal = choice({
-    label: "Mask", value: tool.value > 0.5 ? "show" : "hide",
-    choices: [
-      { value: "hide", label: "Hide", tip: "Hide the layer where you paint" },
-      { value: "show", label: "Show", tip: "Show the layer where you paint" },
-    ],
-    onchange: (value) => setTool(store, { value: value === "show" ? 1 : 0 }),
-  }); // prettier-ignore
   const shape = choice({
     label: "Shape of the gradient", value: tool.shape,
     choices: [{ value: "linear", label: "Straight" }, { value: "radial", label: "Round" }],
@@ -136,7 +130,7 @@ function choiceRows(store) {
     choices: modes.map((mode) => ({ value: mode, label: sentence(mode) })),
     onchange: (value) => setTool(store, { blend: value }),
   }); // prettier-ignore
-  const usual = [
+  return [
     {
       node: shape.node,
       kinds: ["gradient"],
@@ -149,30 +143,6 @@ function choiceRows(store) {
       show: (/** @type {Tool} */ now) => blend.set(now.blend),
     },
   ];
-  const seldom = [
-    {
-      node: element(
-        "div",
-        { class: "row" },
-        element("span", { class: "row-label" }, "Paint on"),
-        channel.node,
-      ),
-      kinds: ["paint", "fill"],
-      show: (/** @type {Tool} */ now) => channel.set(now.channel),
-    },
-    {
-      node: element(
-        "div",
-        { class: "row" },
-        element("span", { class: "row-label" }, "The layer"),
-        reveal.node,
-      ),
-      kinds: ["paint", "fill"],
-      needs: (/** @type {Tool} */ now) => now.channel === "mask",
-      show: (/** @type {Tool} */ now) => reveal.set(now.value > 0.5 ? "show" : "hide"),
-    },
-  ];
-  return [usual, seldom];
 }
 
 /** @param {Store} store @returns {Row[]} */

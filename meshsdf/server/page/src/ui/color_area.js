@@ -16,15 +16,7 @@ const HUES = 90;
 export function colorSquare(onchange) {
   const canvas = element("canvas", { width: SIDE, height: SIDE });
   const thumb = element("span", { class: "square-thumb" });
-  const node = element(
-    "div",
-    {
-      class: "square", role: "slider", tabindex: "0", "aria-label": "Lightness and vividness",
-      "aria-valuemin": "0", "aria-valuemax": "100",
-    },
-    canvas,
-    thumb,
-  ); // prettier-ignore
+  const node = slider("square", "Lightness and vividness", 100, canvas, thumb);
   let pick = { l: 0, s: 0, h: -1 };
   const paint = oncePerFrame((/** @type {number} */ hue) => drawSquare(canvas, hue));
   drag(node, (x, y, done) => onchange({ s: x, l: 1 - y }, done));
@@ -55,15 +47,7 @@ export function colorSquare(onchange) {
 export function hueBar(onchange) {
   const canvas = element("canvas", { width: HUES, height: 1 });
   const thumb = element("span", { class: "hue-thumb" });
-  const node = element(
-    "div",
-    {
-      class: "hue", role: "slider", tabindex: "0", "aria-label": "Hue",
-      "aria-valuemin": "0", "aria-valuemax": "360",
-    },
-    canvas,
-    thumb,
-  ); // prettier-ignore
+  const node = slider("hue", "Hue", 360, canvas, thumb);
   drawHues(canvas);
   let hue = 0;
   drag(node, (x, _, done) => onchange({ h: Math.min(360 * x, 359.99) }, done));
@@ -82,6 +66,18 @@ export function hueBar(onchange) {
       node.setAttribute("aria-valuenow", String(Math.round(now.h)));
     },
   };
+}
+
+/**
+ * @param {string} name
+ * @param {string} label
+ * @param {number} most
+ * @param {...HTMLElement} children
+ */
+function slider(name, label, most, ...children) {
+  const range = { "aria-valuemin": "0", "aria-valuemax": String(most) };
+  const about = { class: name, role: "slider", tabindex: "0", "aria-label": label };
+  return element("div", { ...about, ...range }, children);
 }
 
 /** @param {number} hue */

@@ -2,7 +2,7 @@
 
 import { fromHex, fromPick, isLight, toHex, toPick } from "../color.js";
 import { keep, kept } from "../keep.js";
-import { setTool } from "../tool.js";
+import { COLORING, setTool } from "../tool.js";
 import { card } from "./card.js";
 import { colorSquare, hueBar } from "./color_area.js";
 import { iconButton } from "./controls.js";
@@ -41,6 +41,7 @@ export function colorCard(store) {
   const show = () => {
     const tool = store.get().tool;
     if (!tool) return;
+    made.node.hidden = tool.channel !== "base" && tool.kind !== "eyedropper"; // nothing is coloured
     // The picker's own changes come back here: their hue is known better than a grey can tell
     if (toHex(tool.color) !== shownHex) {
       pick = toPick(tool.color, pick);
@@ -51,20 +52,21 @@ export function colorCard(store) {
     hex.show();
     swatches.mark();
   };
-  store.on("tool", show);
-  store.on("stroking", (is) => is && recent.use());
-  show();
-  showPick();
   const add = iconButton({
     icon: "plus", label: "Keep this colour as a swatch", class: "small", onclick: swatches.add,
   }); // prettier-ignore
-  return card(
+  const made = card(
     { name: "color", title: "Colour" },
     element("div", { class: "picker" }, square.node, hue.node),
     element("div", { class: "color-row" }, chips.node, hex.node, add),
     swatches.node,
     recent.node,
-  ).node;
+  );
+  store.on("tool", show);
+  store.on("stroking", (is) => is && recent.use());
+  show();
+  showPick();
+  return made.node;
 }
 
 /** @param {import("../store.js").Store} store */
@@ -213,7 +215,7 @@ function recentRow(store) {
     /** Called when a stroke begins. */
     use() {
       const tool = store.get().tool;
-      if (!tool || !["paint", "fill", "gradient"].includes(tool.kind)) return;
+      if (!tool || tool.channel !== "base" || !COLORING.includes(tool.kind)) return;
       const color = toHex(tool.color);
       if (colors[0] === color) return;
       colors = [color, ...colors.filter((one) => one !== color)].slice(0, MOST_RECENT);

@@ -15,6 +15,7 @@ export const uniqueId = (word) => `${word}-${++lastId}`;
  * @property {number} value
  * @property {number} [step] of the arrow keys and of rounding; a hundredth of the range if not given
  * @property {boolean} [log] whether equal ways on the bar are equal ratios
+ * @property {boolean} [signed] whether the bar fills from its middle
  * @property {boolean} [open] whether numbers beyond the ends of the bar may be typed
  * @property {string} [unit]
  * @property {(value: number) => string} [words] number to text
@@ -123,7 +124,9 @@ class Bar {
     this.range.value = String(place);
     this.range.setAttribute("aria-valuetext", unit ? `${text} ${unit}` : text);
     if (document.activeElement !== this.number) this.number.value = text;
-    setVars(this.node, { fill: `${(100 * place) / STEPS}%` });
+    const share = (100 * place) / STEPS;
+    const from = this.options.signed ? 50 : 0;
+    setVars(this.node, { fill: `${share}%`, from: `${Math.min(share, from)}%`, way: `${Math.abs(share - from)}%` });
   }
 }
 
@@ -131,7 +134,7 @@ class Bar {
 export const bar = (options) => new Bar(options);
 
 /** @param {string} text with a comma or a point */
-const numberOf = (text) => Number.parseFloat(text.replace(",", "."));
+export const numberOf = (text) => Number.parseFloat(text.replace(",", "."));
 
 /**
  * Three meaningful digits, without an exponent where people read one badly.

@@ -1,7 +1,7 @@
 /** Which key does what. */
 
 import { toast } from "../store.js";
-import { radiusRange, setTool } from "../tool.js";
+import { channels, radiusRange, setTool, takeChannel } from "../tool.js";
 import { swapColors } from "./color_card.js";
 import { savedWords } from "./status_line.js";
 import { mirrored } from "./symmetry_rows.js";
@@ -82,6 +82,12 @@ export function shortcutTable(store, actions, viewer, open) {
       words: "Bricks of the octree",
       run: () => view({ wireframe: !store.get().view.wireframe }),
     },
+    {
+      group: "View",
+      keys: ["R"],
+      words: "Relief",
+      run: () => view({ relief: !store.get().view.relief }),
+    },
     { group: "View", keys: ["L"], words: "Light", run: () => view({ lit: !store.get().view.lit }) },
     { group: "View", keys: ["P"], words: "Hide or show the panels", run: open.panels },
     { group: "Page", keys: ["Ctrl+E"], words: "Export", run: open.exports },
@@ -152,9 +158,24 @@ function brushKeys(store) {
       words: "Flow, in the same way",
       run: (key) => setTool(store, { flow: shareOf(key) }),
     },
-    { group, keys: ["X"], words: "Swap the two colours", run: () => swapColors(store) },
+    { group, keys: ["X"], words: "Swap the two colours, or out and in", run: () => swap(store) },
+    ...(channels(store.get().facts).includes("height")
+      ? [{ group, keys: ["T"], words: "Paint heights, or colour", run: () => toggleHeight(store) }]
+      : []),
     { group, keys: ["M"], words: "Mirror across x", run: mirror },
   ];
+}
+
+/** @param {Store} store */
+function toggleHeight(store) {
+  takeChannel(store, store.get().tool?.channel === "height" ? "base" : "height");
+}
+
+/** @param {Store} store */
+function swap(store) {
+  const { tool } = store.get();
+  if (tool?.channel === "height") setTool(store, { amount: -tool.amount });
+  else swapColors(store);
 }
 
 /** @param {string} key ending in a digit */

@@ -1,7 +1,8 @@
 /** Size, opacity and colour within reach of a thumb while the panels are put away. */
 
 import { toHex } from "../color.js";
-import { radiusRange, DABBING, setTool } from "../tool.js";
+import { COLORING, radiusRange, DABBING, setTool } from "../tool.js";
+import { amountBar } from "./channel_rows.js";
 import { bar, PERCENT, plainNumber } from "./controls.js";
 import { unitOf } from "./brush_card.js";
 import { element, setVars } from "./element.js";
@@ -27,12 +28,14 @@ export function quickBar(store, open) {
     "aria-label": "Colour: open the panels",
     onclick: open,
   });
+  const amount = amountBar(store);
   const node = element(
     "div",
     { class: "quick-bar", role: "group", "aria-label": "Brush" },
     color,
     size.node,
     opacity.node,
+    amount.node,
   );
   const show = () => {
     const now = store.get().tool;
@@ -40,7 +43,10 @@ export function quickBar(store, open) {
     size.set(now.radius);
     opacity.set(now.opacity);
     size.node.hidden = !DABBING.includes(now.kind);
-    opacity.node.hidden = now.kind === "eyedropper";
+    amount.set(now.amount);
+    amount.node.hidden = now.channel !== "height" || !COLORING.includes(now.kind);
+    opacity.node.hidden = now.kind === "eyedropper" || !amount.node.hidden;
+    color.hidden = now.channel !== "base" && now.kind !== "eyedropper";
     setVars(color, { c: toHex(now.color) });
   };
   store.on("tool", show);

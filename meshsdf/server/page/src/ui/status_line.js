@@ -1,5 +1,6 @@
 /** The line at the bottom: what is safe on the disk, who else paints, how fine it is here. */
 
+import { signedNumber } from "./channel_rows.js";
 import { plainNumber } from "./controls.js";
 import { element } from "./element.js";
 import { icon } from "./icons.js";
@@ -59,7 +60,9 @@ export function fineWords({ facts, cursor, tool }) {
   const unit = unitOf(facts);
   const length = (/** @type {number} */ value) => plainNumber(value) + (unit ? ` ${unit}` : "");
   const spacing = cursor?.spacing ?? facts.texel;
-  const words = [`Texel ${length(spacing)}${cursor?.spacing ? " here" : ""}`];
+  const words = [];
+  if (cursor?.height) words.push(`Height ${signedNumber(cursor.height)} texels`);
+  words.push(`Texel ${length(spacing)}${cursor?.spacing ? " here" : ""}`);
   if (tool && DABBING.includes(tool.kind)) {
     const texels = (2 * tool.radius) / facts.texel;
     words.push(

@@ -35,6 +35,12 @@ export function topBar(store, session, actions, viewer, open) {
     key: "L",
     onclick: () => setView({ lit: !store.get().view.lit }),
   });
+  const hasRelief = displays.includes("displacement");
+  const relief = iconButton({
+    icon: "relief", label: "Relief", key: "R",
+    onclick: () => setView({ relief: !store.get().view.relief }),
+  }); // prettier-ignore
+  relief.hidden = !hasRelief;
   const wire = iconButton({
     icon: "wireframe", label: "Bricks of the octree", key: "W",
     onclick: () => setView({ wireframe: !store.get().view.wireframe }),
@@ -59,6 +65,7 @@ export function topBar(store, session, actions, viewer, open) {
     const { view, state } = store.get();
     shown.set(view.show);
     lit.setAttribute("aria-pressed", String(view.lit));
+    relief.setAttribute("aria-pressed", String(view.relief));
     wire.setAttribute("aria-pressed", String(view.wireframe));
     undo.disabled = !state?.history.done.length;
     redo.disabled = !state?.history.undone.length;
@@ -80,6 +87,7 @@ export function topBar(store, session, actions, viewer, open) {
       { class: "bar-group", role: "group", "aria-label": "View" },
       shown.node,
       lit,
+      relief,
       wire,
       viewMenu(viewer).node,
     ),

@@ -1,44 +1,55 @@
 /**
- * Bricks of 9^3 nodes side by side in one volume on the graphics card.
+ * Bricks of 9^3 nodes of one picture side by side in one volume on the graphics card.
  *
- * The volume grows by layers of bricks; what it holds is copied there by the card itself. The format
- * is sRGB, so that the card blends premultiplied colours in linear light.
+ * The volume grows by layers of bricks. Colours are sRGB there, so that the card blends them in
+ * linear light; heights are pairs of halves, which every WebGL 2 filters, too.
  */
 
-import { Box3, ClampToEdgeWrapping, Data3DTexture, LinearFilter, RGBAFormat, SRGBColorSpace, UnsignedByteType, Vector3 } from "three"; // prettier-ignore
+import { Box3, ClampToEdgeWrapping, Data3DTexture, HalfFloatType, LinearFilter, NoColorSpace, RGBAFormat, RGFormat, SRGBColorSpace, UnsignedByteType, Vector3 } from "three"; // prettier-ignore
 
 export const SIDE = 9;
 export const ACROSS = 28; // bricks in a row, and rows in a layer: 252 nodes, which every card allows
 const PER_LAYER = ACROSS * ACROSS;
-const BYTES_PER_LAYER = 4 * (SIDE * ACROSS) ** 2 * SIDE;
+const BYTES_PER_LAYER = 4 * (SIDE * ACROSS) ** 2 * SIDE; // of every picture
 const MOST_BYTES = 512 * 2 ** 20;
 const MOST_BYTES_SMALL = 128 * 2 ** 20; // on machines with little memory
-const FIRST_LAYERS = 2;
+const FIRST_LAYERS = { base: 2, normal: 1, height: 1 };
 const STAGED = ACROSS; // bricks that go up in one call at most
 
+/** @typedef {import("./formats.js").Format} Format */
+
 export class Atlas {
-  /** @param {import("three").WebGLRenderer} renderer */
-  constructor(renderer) {
+  /**
+   * @param {import("three").WebGLRenderer} renderer
+   * @param {Format} format
+   */
+  constructor(renderer, format) {
     this.renderer = renderer;
+    this.format = format;
     const gl = renderer.getContext();
     const most = /** @type {WebGL2RenderingContext} */ (gl).MAX_3D_TEXTURE_SIZE;
     const memory = /** @type {any} */ (navigator).deviceMemory ?? 8;
     const bytes = memory <= 4 ? MOST_BYTES_SMALL : MOST_BYTES;
     this.mostLayers = Math.min(Math.floor(gl.getParameter(most) / SIDE), Math.floor(bytes / BYTES_PER_LAYER));
-    this.layers = Math.min(FIRST_LAYERS, this.mostLayers);
-    this.texture = volume(this.layers);
+    this.layers = Math.min(FIRST_LAYERS[format.name], this.mostLayers);
+    this.texture = volume(this.layers, format);
     renderer.initTexture(this.texture);
     /** @type {number[]} */
     this.free = [];
     this.used = 0; // slots below are taken or free again
-    this.staged = new Uint8Array(4 * SIDE ** 3 * STAGED);
-    this.staging = new Data3DTexture(this.staged, SIDE * STAGED, SIDE, SIDE);
-    this.staging.format = RGBAFormat;
+    const { Kind, parts } = format;
+    this.staged = new Kind(parts * SIDE ** 3 * STAGED);
+    this.staging = new Data3DTexture(/** @type {any} */ (this.staged), SIDE * STAGED, SIDE, SIDE);
   }
 
   /** How many bricks it can ever hold. */
   get capacity() {
     return this.mostLayers * PER_LAYER;
+  }
+
+  /** How many bricks it holds before it grows. */
+  get room() {
+    return this.layers * PER_LAYER;
   }
 
   /**
@@ -49,7 +60,7 @@ export class Atlas {
   take() {
     const slot = this.free.pop();
     if (slot !== undefined) return slot;
-    if (this.used === this.layers * PER_LAYER && !this.#grow()) return -1;
+    if (this.used === this.room) return -1;
     this.used += 1;
     return this.used - 1;
   }
@@ -67,12 +78,13 @@ export class Atlas {
    */
   upload(places, bricks) {
     const ordered = [...places].sort((a, b) => a.slot - b.slot);
-    const row = 4 * SIDE * STAGED;
+    const { parts } = this.format;
+    const row = parts * SIDE * STAGED;
     for (let begin = 0; begin < ordered.length; ) {
       const first = ordered[begin].slot;
       let n = 0;
       while (ordered[begin + n]?.slot === first + n && (n === 0 || (first + n) % ACROSS)) {
-        bricks.unpack(ordered[begin + n].entry, this.staged, 4 * SIDE * n, row, row * SIDE);
+        bricks.unpack(ordered[begin + n].entry, this.staged, parts * SIDE * n, row, row * SIDE);
         n += 1;
       }
       const box = new Box3(new Vector3(0, 0, 0), new Vector3(SIDE * n, SIDE, SIDE));
@@ -81,20 +93,16 @@ export class Atlas {
     }
   }
 
-  /** Forget all bricks. */
-  clear() {
-    this.free = [];
-    this.used = 0;
-  }
-
-  dispose() {
-    this.texture.dispose();
-  }
-
-  #grow() {
+  /**
+   * Make room for more bricks; what is there keeps its slots.
+   *
+   * @param {() => void} refill called if what was there must go up again
+   * @returns {boolean} whether there is more room
+   */
+  grow(refill) {
     const layers = Math.min(2 * this.layers, this.mostLayers);
     if (layers === this.layers) return false;
-    const larger = volume(layers);
+    const larger = volume(layers, this.format);
     const gl = this.renderer.getContext();
     while (gl.getError() !== gl.NO_ERROR); // what went wrong before is not of this
     this.renderer.initTexture(larger);
@@ -103,11 +111,19 @@ export class Atlas {
       this.mostLayers = this.layers; // the card's memory is full
       return false;
     }
-    this.renderer.copyTextureToTexture(this.texture, larger);
+    // Copies pass through what can be drawn into, which halves need not be
+    const isCopied = this.format.Kind === Uint8Array;
+    if (isCopied) this.renderer.copyTextureToTexture(this.texture, larger);
     this.texture.dispose();
     this.texture = larger;
     this.layers = layers;
+    if (!isCopied) refill();
     return true;
+  }
+
+  dispose() {
+    this.texture.dispose();
+    this.staging.dispose();
   }
 }
 
@@ -124,12 +140,16 @@ export function slotPlace(slot) {
   );
 }
 
-/** @param {number} layers */
-function volume(layers) {
+/**
+ * @param {number} layers
+ * @param {Format} format
+ */
+function volume(layers, { name, Kind }) {
   const texture = new Data3DTexture(null, SIDE * ACROSS, SIDE * ACROSS, SIDE * layers);
-  texture.format = RGBAFormat;
-  texture.type = UnsignedByteType;
-  texture.colorSpace = SRGBColorSpace;
+  const isHalves = Kind === Uint16Array;
+  texture.format = isHalves ? RGFormat : RGBAFormat;
+  texture.type = isHalves ? HalfFloatType : UnsignedByteType;
+  texture.colorSpace = name === "base" ? SRGBColorSpace : NoColorSpace;
   texture.minFilter = texture.magFilter = LinearFilter;
   texture.wrapS = texture.wrapT = texture.wrapR = ClampToEdgeWrapping;
   texture.generateMipmaps = false;

@@ -1,21 +1,23 @@
 /**
- * The newest brick of every entry, as it came over the wire.
+ * The newest brick of every entry of one picture, as it came over the wire.
  *
  * The graphics card has only copies: what it loses, or has no room for, is here.
  */
 
 import { ABSENT, BRICK_NODES, MASK_BYTES, TEXELS, UNIFORM } from "../net/protocol.js";
+import { FORMATS, heightOf } from "./formats.js";
+import { findBrick } from "./octree.js";
 
 /** @typedef {import("../net/protocol.js").Brick} Brick */
-
-const DECODED = Float64Array.from({ length: 256 }, (_, byte) => {
-  const value = byte / 255;
-  return value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4;
-});
+/** @typedef {import("./formats.js").Format} Format */
 
 export class Bricks {
-  /** @param {number} nEntries */
-  constructor(nEntries) {
+  /**
+   * @param {number} nEntries
+   * @param {Format} [format]
+   */
+  constructor(nEntries, format = FORMATS.base) {
+    this.format = format;
     this.states = new Uint8Array(nEntries);
     /** @type {(Uint8Array | undefined)[]} */
     this.data = new Array(nEntries);
@@ -39,56 +41,68 @@ export class Bricks {
     return this.states[entry] !== ABSENT;
   }
 
-  /**
-   * The four bytes of a uniform brick.
-   *
-   * @param {number} entry
-   */
-  color(entry) {
-    return this.#dataOf(entry);
+  /** The same bricks, which do not change with these. */
+  copy() {
+    const other = new Bricks(0, this.format);
+    other.states = this.states.slice();
+    other.data = this.data.slice();
+    other.count = this.count;
+    return other;
+  }
+
+  /** Entries that have a brick. */
+  known() {
+    return [...this.data.keys()].filter((entry) => this.has(entry));
   }
 
   /**
-   * Unpack a brick's 9^3 nodes, x fastest, into rows of an image.
+   * The bytes of a brick: four of a uniform one, else its mask and nodes.
+   *
+   * @param {number} entry that has a brick
+   */
+  bytes(entry) {
+    return /** @type {Uint8Array} */ (this.data[entry]);
+  }
+
+  /**
+   * Unpack a brick's 9^3 nodes, x fastest, into rows of an image, as the card holds them.
    *
    * @param {number} entry of state TEXELS
-   * @param {Uint8Array} out RGBA
-   * @param {number} first byte of node (0, 0, 0)
-   * @param {number} row bytes from a node to the next along y
-   * @param {number} slice bytes along z
+   * @param {Uint8Array | Uint16Array} out
+   * @param {number} first number of node (0, 0, 0) in it
+   * @param {number} row numbers from a node to the next along y
+   * @param {number} slice numbers along z
    */
   unpack(entry, out, first, row, slice) {
-    const data = this.#dataOf(entry);
+    const { parts, clear, pack } = this.format;
+    const data = this.bytes(entry);
     let at = MASK_BYTES;
     for (let bit = 0; bit < BRICK_NODES; bit++) {
       // On the wire z is fastest: bit 81 i + 9 j + k
       const i = Math.floor(bit / 81);
       const j = Math.floor(bit / 9) % 9;
-      const to = first + 4 * i + row * j + slice * (bit % 9);
+      const to = first + parts * i + row * j + slice * (bit % 9);
       if ((data[bit >> 3] >> (bit & 7)) & 1) {
-        out[to] = data[at];
-        out[to + 1] = data[at + 1];
-        out[to + 2] = data[at + 2];
-        out[to + 3] = data[at + 3];
+        pack(data, at, out, to);
         at += 4;
-      } else out[to] = out[to + 1] = out[to + 2] = out[to + 3] = 0;
+      } else for (let part = 0; part < parts; part++) out[to + part] = clear[part];
     }
   }
 
   /**
    * All bricks in rising order of their entries, as the server's checksum of what is shown has them:
-   * entry, state, number of colours, and what followed on the wire.
+   * entry, state, number of nodes, and what followed on the wire.
    *
    * @returns {Uint8Array<ArrayBuffer>}
    */
   content() {
-    const known = [...this.data.keys()].filter((entry) => this.has(entry));
-    const sizes = known.map((entry) => 8 + this.#dataOf(entry).length);
+    const known = this.known();
+    const sizes = known.map((entry) => 8 + this.bytes(entry).length);
     const all = new Uint8Array(sizes.reduce((sum, size) => sum + size, 0));
     const view = new DataView(all.buffer);
     let at = 0;
     known.forEach((entry, n) => {
-      const data = this.#dataOf(entry);
+      const data = this.bytes(entry);
       const state = this.states[entry];
       view.setUint32(at, entry, true);
       view.setUint8(at + 4, state);
@@ -99,9 +113,20 @@ export class Bricks {
     return all;
   }
 
-  /** @param {number} entry that has a brick */
-  #dataOf(entry) {
-    return /** @type {Uint8Array} */ (this.data[entry]);
+  /**
+   * What is shown at a point.
+   *
+   * @param {import("./octree.js").Octree} octree
+   * @param {readonly number[]} point
+   * @param {readonly number[]} normal of the face
+   * @returns {{values: import("./formats.js").Four, level: number, entry: number} | null} values
+   *     times coverage, coverage
+   */
+  valuesAt(octree, point, normal) {
+    const found = findBrick(octree, (entry) => this.has(entry), point, normal);
+    if (!found) return null;
+    const { entry, level, local } = found;
+    return { values: this.sample(entry, local), level, entry };
   }
 
   /**
@@ -109,20 +134,14 @@ export class Bricks {
    *
    * @param {number} entry
    * @param {readonly number[]} local 0 to 8
-   * @returns {[number, number, number, number]} linear, premultiplied
+   * @returns {import("./formats.js").Four} values times coverage, coverage
    */
   sample(entry, local) {
-    const data = this.#dataOf(entry);
-    /** @type {[number, number, number, number]} */
+    const data = this.bytes(entry);
+    const { decode } = this.format;
+    if (this.states[entry] === UNIFORM) return decode(data, 0);
+    /** @type {import("./formats.js").Four} */
     const sum = [0, 0, 0, 0];
-    const add = (/** @type {number} */ at, /** @type {number} */ weight) => {
-      for (let c = 0; c < 3; c++) sum[c] += weight * DECODED[data[at + c]];
-      sum[3] += (weight * data[at + 3]) / 255;
-    };
-    if (this.states[entry] === UNIFORM) {
-      add(0, 1);
-      return sum;
-    }
     const low = local.map((value) => Math.min(Math.max(Math.floor(value), 0), 7));
     const part = local.map((value, axis) => value - low[axis]);
     for (let corner = 0; corner < 8; corner++) {
@@ -131,10 +150,42 @@ export class Bricks {
       for (let axis = 0; axis < 3; axis++) weight *= d[axis] ? part[axis] : 1 - part[axis];
       const bit = 81 * (low[0] + d[0]) + 9 * (low[1] + d[1]) + low[2] + d[2];
       if (weight && (data[bit >> 3] >> (bit & 7)) & 1) {
-        add(MASK_BYTES + 4 * bitsBefore(data, bit), weight);
+        const values = decode(data, MASK_BYTES + 4 * bitsBefore(data, bit));
+        values.forEach((value, n) => (sum[n] += weight * value));
       }
     }
     return sum;
+  }
+}
+
+/** The bricks of the picture of heights, which know how far these reach. */
+export class HeightBricks extends Bricks {
+  /** @param {number} nEntries */
+  constructor(nEntries) {
+    super(nEntries, FORMATS.height);
+    this.reaches = new Float32Array(nEntries); // largest |height| in every brick
+  }
+
+  /** @param {Brick} brick */
+  put(brick) {
+    if (!super.put(brick)) return false;
+    this.reaches[brick.entry] = brick.state === ABSENT ? 0 : this.#reachOf(brick.entry);
+    return true;
+  }
+
+  /** The largest |height| of all. */
+  reach() {
+    return this.reaches.reduce((most, one) => Math.max(most, one), 0);
+  }
+
+  /** @param {number} entry */
+  #reachOf(entry) {
+    const data = this.bytes(entry);
+    let most = 0;
+    for (let at = this.states[entry] === TEXELS ? MASK_BYTES : 0; at < data.length; at += 4) {
+      most = Math.max(most, Math.abs(heightOf(data, at)));
+    }
+    return most;
   }
 }
 

@@ -13,6 +13,8 @@ const CREASE = Math.cos((50 * Math.PI) / 180);
  * @typedef {object} Shaded
  * @property {Float32Array} positions (v, 3)
  * @property {Float32Array} normals (v, 3)
+ * @property {Float32Array} away (v, 3) of all faces at a place, whatever the edges: the way along
+ *     which the place moves
  * @property {Uint32Array} index (m, 3)
  */
 
@@ -34,8 +36,11 @@ export function shadedMesh(positions, faces) {
   const outPositions = [];
   /** @type {number[]} */
   const outNormals = [];
+  /** @type {number[]} */
+  const outAway = [];
   for (let p = 0; p < first.length - 1; p++) {
     const made = outPositions.length / 3; // vertices of this place begin here
+    const away = meanNormal(first[p], first[p + 1], corners, faceNormals, angles, null);
     for (let at = first[p]; at < first[p + 1]; at++) {
       const corner = corners[at];
       const [x, y, z] = cornerNormal(corner, first[p], first[p + 1], corners, faceNormals, angles);
@@ -49,6 +54,7 @@ export function shadedMesh(positions, faces) {
         const v = 3 * faces[corner];
         outPositions.push(positions[v], positions[v + 1], positions[v + 2]);
         outNormals.push(x, y, z);
+        outAway.push(...away);
       }
       index[corner] = vertex;
     }
@@ -56,6 +62,7 @@ export function shadedMesh(positions, faces) {
   return {
     positions: Float32Array.from(outPositions),
     normals: Float32Array.from(outNormals),
+    away: Float32Array.from(outAway),
     index,
   };
 }
@@ -158,18 +165,34 @@ function cornersAround(place, faces, n) {
  */
 function cornerNormal(corner, begin, end, corners, normals, angles) {
   const face = 3 * Math.floor(corner / 3);
-  const [nx, ny, nz] = [normals[face], normals[face + 1], normals[face + 2]];
-  const isFlat = nx === 0 && ny === 0 && nz === 0; // a face without area goes along with all others
+  const [x, y, z] = normals.subarray(face, face + 3);
+  const isFlat = x === 0 && y === 0 && z === 0; // a face without area goes along with all others
+  const mean = meanNormal(begin, end, corners, normals, angles, isFlat ? null : [x, y, z]);
+  return mean[0] === 0 && mean[1] === 0 && mean[2] === 0 ? [x, y, z] : mean;
+}
+
+/**
+ * The mean normal of the faces at a place, weighted by their angles there.
+ *
+ * @param {number} begin
+ * @param {number} end
+ * @param {Uint32Array} corners
+ * @param {Float32Array} normals of faces
+ * @param {Float32Array} angles
+ * @param {readonly [number, number, number] | null} way only of faces that look this way
+ * @returns {[number, number, number]} of length 1, or 0
+ */
+function meanNormal(begin, end, corners, normals, angles, way) {
   let [x, y, z] = [0, 0, 0];
   for (let at = begin; at < end; at++) {
-    const other = 3 * Math.floor(corners[at] / 3);
-    const dot = normals[other] * nx + normals[other + 1] * ny + normals[other + 2] * nz;
-    if (!isFlat && dot < CREASE) continue;
+    const face = 3 * Math.floor(corners[at] / 3);
+    const [nx, ny, nz] = [normals[face], normals[face + 1], normals[face + 2]];
+    if (way && nx * way[0] + ny * way[1] + nz * way[2] < CREASE) continue;
     const weight = angles[corners[at]];
-    x += weight * normals[other];
-    y += weight * normals[other + 1];
-    z += weight * normals[other + 2];
+    x += weight * nx;
+    y += weight * ny;
+    z += weight * nz;
   }
   const length = Math.hypot(x, y, z);
-  return length > 0 ? [x / length, y / length, z / length] : [nx, ny, nz];
+  return length > 0 ? [x / length, y / length, z / length] : [0, 0, 0];
 }

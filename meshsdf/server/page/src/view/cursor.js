@@ -74,11 +74,12 @@ export class Cursor {
    *
    * @param {import("./region.js").Region} region
    * @param {import("./orbit.js").Orbit} orbit
+   * @param {number} spread how far the surface may have moved
    */
-  mark(region, orbit) {
+  mark(region, orbit, spread) {
     const { nCursors, cursors, rings } = this.uniforms;
     for (const center of cursors.value.slice(0, nCursors.value)) {
-      region.addBall(orbit, center, rings.value[0]);
+      region.addBall(orbit, center, rings.value[0] + spread);
     }
   }
 }

@@ -1,25 +1,40 @@
 /**
- * The painted surface: colours are looked up by position alone.
+ * The painted surface as the graphics card draws it, moved by its heights and lit.
  *
- * `shown` repeats `findBrick` of octree.js: the page table of a level, the sheet that looks the way
- * of the face, the brick in the atlas, blended by the card; where nothing is stored, the level above.
- * A pixel that covers more than a texel lies between two levels (Williams 1983, "Pyramidal
- * parametrics", doi:10.1145/800059.801126).
+ * What is not there or not wanted is left out of the program: SHOW is the number of a display, LIT,
+ * RELIEF, BRICKS, HEIGHTS and NORMALS are 0 or 1, the last two whether something is painted there.
  */
+
+import { COLORS_GLSL, DETAIL_GLSL, FIND_GLSL, HEIGHTS_GLSL, NORMALS_GLSL } from "./lookup_shader.js";
+import { RAMP_GLSL } from "./ramp.js";
+
+/** Displays by their numbers. */
+export const SHOWS = ["color", "normal", "displacement"];
 
 export const PAINT_VERTEX = /* glsl */ `
 precision highp float;
+precision highp int;
+#if RELIEF && HEIGHTS
+${FIND_GLSL}
+${HEIGHTS_GLSL}
+uniform int moveLevel; // whose texels are about as far apart as the vertices
+#endif
 in vec3 position;
 in vec3 normal;
+in vec3 away; // the same for all vertices at a place, so that nothing tears where they move
 uniform mat4 modelViewMatrix;
 uniform mat4 projectionMatrix;
-out vec3 place;
+out vec3 place; // before it was moved: that is where the texture knows it
 out vec3 seen;
 centroid out vec3 smoothNormal; // not beyond the triangle, where the rim would glitter
 centroid out vec3 viewNormal;
 
 void main() {
-  vec4 view = modelViewMatrix * vec4(position, 1.0);
+  vec3 moved = position;
+#if RELIEF && HEIGHTS
+  moved += away * (heightAt(position * perTexel, away, moveLevel) / perTexel);
+#endif
+  vec4 view = modelViewMatrix * vec4(moved, 1.0);
   place = position;
   seen = view.xyz;
   smoothNormal = normal;
@@ -28,115 +43,29 @@ void main() {
 }
 `;
 
-/**
- * Looking colours up: needs SHIFT, LEVELS and the uniforms of `lookupUniforms`.
- */
-const LOOKUP = /* glsl */ `
-uniform highp isampler2D pages;
-uniform highp isampler2D groups;
-uniform highp isampler2D sheets;
-uniform highp usampler2D states;
-uniform highp sampler3D atlas;
-uniform ivec4 heads[LEVELS];
-uniform float perTexel;
-
-ivec2 cellOf(int number) {
-  return ivec2(number & ((1 << SHIFT) - 1), number >> SHIFT);
-}
-
-int pageCell(int page, ivec3 cell) {
-  cell &= 15;
-  return texelFetch(pages, cellOf((page << 12) + (cell.x << 8) + (cell.y << 4) + cell.z), 0).r;
-}
-
-vec3 sheetNormal(int entry) {
-  ivec2 code = texelFetch(sheets, cellOf(entry), 0).rg;
-  if (code.x == -32768) return vec3(0.0);
-  vec2 xy = vec2(code) / 32767.0;
-  float z = 1.0 - abs(xy.x) - abs(xy.y);
-  float fold = max(-z, 0.0);
-  xy += vec2(xy.x >= 0.0 ? -fold : fold, xy.y >= 0.0 ? -fold : fold);
-  return normalize(vec3(xy, z));
-}
-
-int findEntry(int level, ivec3 brick, vec3 facing) {
-  ivec3 b = brick - heads[level].xyz;
-  if (((b.x | b.y | b.z) & ~4095) != 0) return -1;
-  int page = pageCell(heads[level].w, b >> 8);
-  if (page < 0) return -1;
-  page = pageCell(page, b >> 4);
-  if (page < 0) return -1;
-  int code = pageCell(page, b);
-  if (code > -3) return code;
-  ivec2 group = texelFetch(groups, cellOf(-3 - code), 0).rg;
-  int best = -1;
-  float most = -1e30;
-  for (int entry = group.x; entry < group.x + group.y; entry++) {
-    float along = dot(sheetNormal(entry), facing);
-    if (along > most) {
-      best = entry;
-      most = along;
-    }
-  }
-  return best;
-}
-
-vec3 linearOf(vec3 c) {
-  return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, vec3(lessThanEqual(c, vec3(0.04045))));
-}
-
-// The finest brick with something to show, from a level on; texels: the place in finest nodes
-bool findBrick(vec3 texels, vec3 facing, inout int level, out vec3 local, out uvec2 state) {
-  for (; level < LEVELS; level++) {
-    vec3 nodes = texels * intBitsToFloat((127 - level) << 23); // 2^-level, exactly
-    ivec3 brick = ivec3(floor(nodes * 0.125));
-    int entry = findEntry(level, brick, facing);
-    if (entry < 0) continue;
-    state = texelFetch(states, cellOf(entry), 0).rg;
-    local = nodes - 8.0 * vec3(brick);
-    if (state.x != 0u) return true;
-  }
-  return false;
-}
-
-// Linear, premultiplied
-vec4 shown(vec3 texels, vec3 facing, inout int level) {
-  vec3 local;
-  uvec2 state;
-  if (!findBrick(texels, facing, level, local, state)) return vec4(0.0);
-  if (state.x == 0x80000000u) {
-    uvec3 slot = uvec3(state.y, state.y >> 10u, state.y >> 20u) & 1023u;
-    return textureLod(atlas, (vec3(slot) + local + 0.5) / vec3(textureSize(atlas, 0)), 0.0);
-  }
-  vec4 bytes = vec4((uvec4(state.y) >> uvec4(0u, 8u, 16u, 24u)) & 255u) / 255.0;
-  return vec4(linearOf(bytes.rgb), bytes.a);
-}
-
-vec4 textureAt(vec3 point, vec3 facing) {
-  vec3 texels = point * perTexel;
-  float width = max(length(dFdx(texels)), length(dFdy(texels)));
-  float detail = clamp(log2(max(width, 1.0)), 0.0, float(LEVELS - 1));
-  int level = int(detail);
-  float share = detail - float(level);
-  int found = level;
-  vec4 fine = shown(texels, facing, found);
-  if (share == 0.0 || found > level) return fine;
-  found = level + 1;
-  return mix(fine, shown(texels, facing, found), share);
-}
-`;
-
 export const PAINT_FRAGMENT = /* glsl */ `
 precision highp float;
 precision highp int;
-${LOOKUP}
+${FIND_GLSL}
+${DETAIL_GLSL}
+${COLORS_GLSL}
+BETWEEN(colorBetween, colorAt)
+#if HEIGHTS && (RELIEF || SHOW == 2)
+${HEIGHTS_GLSL}
+BETWEEN(heightBetween, slopeAndHeight)
+#endif
+#if NORMALS && RELIEF
+${NORMALS_GLSL}
+BETWEEN(normalBetween, normalAt)
+#endif
+${RAMP_GLSL}
 in vec3 place;
 in vec3 seen;
 centroid in vec3 smoothNormal;
 centroid in vec3 viewNormal;
-uniform int show; // 0 colour in light, 1 colour alone, 2 normals
+uniform mat4 modelViewMatrix;
+uniform float reach; // largest height
 uniform vec3 bare;
-uniform bool wireframe;
 uniform int nCursors;
 uniform vec3 cursors[CURSORS];
 uniform vec3 cursorNormals[CURSORS];
@@ -207,8 +136,8 @@ vec3 withBricks(vec3 color, vec3 facing) {
   vec3 local;
   uvec2 state;
   int level = 0;
-  if (!findBrick(texels, facing, level, local, state)) return color;
-  slope *= intBitsToFloat((127 - level) << 23);
+  if (!findBrick(baseStates, texels, facing, level, local, state)) return color;
+  slope *= scaleOf(-level);
   vec3 away = min(local, 8.0 - local);
   // A face that the surface runs along would be a stain, not a line
   vec3 crossing = smoothstep(0.08, 0.25, slope / max(max(slope.x, slope.y), slope.z));
@@ -223,16 +152,45 @@ void main() {
   // Which way the face looks by its winding, whichever side is seen
   vec3 facing = normalize(cross(dFdx(place), dFdy(place)));
   if (!gl_FrontFacing) facing = -facing;
-  vec3 color;
-  if (show == 2) {
-    color = 0.5 + 0.5 * normalize(smoothNormal);
-  } else {
-    vec4 paint = textureAt(place, facing);
-    vec3 albedo = paint.rgb + (1.0 - paint.a) * bare;
-    vec3 n = normalize(viewNormal) * (gl_FrontFacing ? 1.0 : -1.0);
-    color = encoded(show == 0 ? lit(albedo, n) : albedo);
+  vec3 texels = place * perTexel;
+  float detail = detailOf(texels);
+  vec3 own = normalize(smoothNormal);
+  vec3 n = normalize(viewNormal);
+  vec4 raised = vec4(0.0);
+  vec4 painted = vec4(0.0);
+#if HEIGHTS && (RELIEF || SHOW == 2)
+  raised = heightBetween(texels, facing, detail);
+#endif
+#if NORMALS && RELIEF
+  painted = normalBetween(texels, facing, detail);
+#endif
+#if RELIEF && (HEIGHTS || NORMALS)
+  if (painted.a > 0.0 || raised.xyz != vec3(0.0)) {
+    own = normalize((1.0 - painted.a) * own + painted.xyz);
+    own = normalize(own - raised.xyz);
+    n = normalize(mat3(modelViewMatrix) * own);
   }
-  if (wireframe) color = withBricks(color, facing);
+#endif
+  // From behind it is lit as if it looked here; slivers at the rim of a bump are not from behind
+  if (!gl_FrontFacing && dot(n, normalize(seen)) > 0.1) n = -n;
+#if SHOW == 1
+  vec3 color = 0.5 + 0.5 * own;
+#elif SHOW == 2
+  vec3 color = rampColor(raised.w, reach);
+#if LIT
+  color = encoded(lit(linearOf(color), n));
+#endif
+#else
+  vec4 paint = colorBetween(texels, facing, detail);
+  vec3 color = paint.rgb + (1.0 - paint.a) * bare;
+#if LIT
+  color = lit(color, n);
+#endif
+  color = encoded(color);
+#endif
+#if BRICKS
+  color = withBricks(color, facing);
+#endif
   pixel = vec4(withRings(color, facing), 1.0);
 }
 `;

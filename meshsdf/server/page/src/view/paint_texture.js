@@ -1,65 +1,57 @@
 /**
- * The painted texture on the graphics card: page table, atlas, and what every entry shows.
+ * One picture of the texture on the graphics card: an atlas, and what every entry shows.
  *
- * Only what changes goes up. Where the atlas is full, the bricks that are wanted least make room,
- * and coarser levels show in their place until the camera comes near.
+ * Only what changes goes up, and nothing lies there before the first brick came. Where the atlas is
+ * full, the bricks that are wanted least make room, and coarser levels show in their place until the
+ * camera comes near.
  */
 
 import { TEXELS, UNIFORM } from "../net/protocol.js";
 import { Atlas, slotPlace } from "./atlas.js";
-import { Bricks } from "./bricks.js";
-import { findBrick } from "./octree.js";
 import { mostWanted, worths } from "./residency.js";
-import { SHIFT, Tables } from "./tables.js";
+import { States } from "./tables.js";
 
 const NO_SLOT = -1;
 const FILLED_PER_FRAME = 512; // bricks that come back to the card in one frame
+const NONE = new Int32Array(0);
 
 export class PaintTexture {
   /**
    * @param {import("three").WebGLRenderer} renderer
    * @param {import("./octree.js").Octree} octree
+   * @param {import("./bricks.js").Bricks} bricks
    */
-  constructor(renderer, octree) {
+  constructor(renderer, octree, bricks) {
+    this.renderer = renderer;
     this.octree = octree;
-    this.bricks = new Bricks(octree.nEntries);
+    this.bricks = bricks;
     this.slots = new Int32Array(octree.nEntries).fill(NO_SLOT);
     this.resident = 0;
     /** @type {Int32Array} those that may make room, the least wanted last */
-    this.order = new Int32Array(0);
+    this.order = NONE;
     /** @type {Int32Array} those that should come to the card, the most wanted last */
-    this.missing = new Int32Array(0);
+    this.missing = NONE;
     this.isCrowded = false; // some bricks found no room
-    this.uniforms = {
-      pages: { value: /** @type {any} */ (null) },
-      groups: { value: /** @type {any} */ (null) },
-      sheets: { value: /** @type {any} */ (null) },
-      states: { value: /** @type {any} */ (null) },
-      atlas: { value: /** @type {any} */ (null) },
-      heads: { value: octree.heads },
-      perTexel: { value: 1 / octree.texel },
-    };
-    this.defines = { SHIFT, LEVELS: octree.nLevels };
-    this.tables = new Tables(renderer, octree);
-    this.atlas = new Atlas(renderer);
-    this.#bind();
+    /** @type {States | null} */
+    this.states = null;
+    /** @type {Atlas | null} */
+    this.atlas = null;
   }
 
-  /**
-   * Make everything on the card anew, after it lost all it had.
-   *
-   * @param {import("three").WebGLRenderer} renderer
-   */
-  allocate(renderer) {
-    this.tables = new Tables(renderer, this.octree);
-    this.atlas = new Atlas(renderer);
+  /** Have room on the card. */
+  wake() {
+    this.states ??= new States(this.renderer, this.octree.nEntries);
+    this.atlas ??= new Atlas(this.renderer, this.bricks.format);
+    return { states: this.states, atlas: this.atlas };
+  }
+
+  /** Make everything on the card anew, after it lost all it had. */
+  allocate() {
+    const known = this.bricks.known();
+    if (!this.states && !known.length) return;
+    this.states = this.atlas = null;
     this.slots.fill(NO_SLOT);
     this.resident = 0;
-    this.#bind();
-    const known = [];
-    for (let entry = 0; entry < this.octree.nEntries; entry++) {
-      if (this.bricks.has(entry)) known.push(entry);
-    }
     this.#show(known);
   }
 
@@ -71,7 +63,7 @@ export class PaintTexture {
   take(bricks) {
     const entries = [];
     for (const brick of bricks) if (this.bricks.put(brick)) entries.push(brick.entry);
-    this.#show(entries);
+    if (entries.length) this.#show(entries);
   }
 
   /**
@@ -80,7 +72,7 @@ export class PaintTexture {
    * @param {import("./residency.js").Sight} sight
    */
   choose(sight) {
-    if (!this.isCrowded) return;
+    if (!this.isCrowded || !this.atlas) return;
     const worth = worths(this.octree, sight);
     const wanted = mostWanted(this.bricks.states, TEXELS, worth, this.bricks.count);
     const inside = wanted.subarray(0, this.atlas.capacity);
@@ -102,83 +94,80 @@ export class PaintTexture {
     return left > 0;
   }
 
-  /**
-   * What is shown at a point.
-   *
-   * @param {readonly number[]} point
-   * @param {readonly number[]} normal of the face
-   * @returns {{color: [number, number, number, number], level: number, entry: number} | null}
-   *     linear, premultiplied
-   */
-  colorAt(point, normal) {
-    const found = findBrick(this.octree, (entry) => this.bricks.has(entry), point, normal);
-    if (!found) return null;
-    const { entry, level, local } = found;
-    return { color: this.bricks.sample(entry, local), level, entry };
-  }
-
   dispose() {
-    this.tables.dispose();
-    this.atlas.dispose();
-  }
-
-  #bind() {
-    const { pages, groups, sheets, states } = this.tables;
-    for (const [name, value] of Object.entries({ pages, groups, sheets, states })) {
-      this.uniforms[/** @type {"pages"} */ (name)].value = value;
-    }
-    this.uniforms.atlas.value = this.atlas.texture;
+    this.states?.dispose();
+    this.atlas?.dispose();
   }
 
   /** @param {readonly number[]} entries whose bricks are new */
   #show(entries) {
+    const { states, atlas } = this.wake();
     const places = [];
     for (const entry of entries) {
       const state = this.bricks.states[entry];
       if (state !== TEXELS) {
         this.#release(entry);
-        if (state === UNIFORM) this.tables.setUniform(entry, this.bricks.color(entry));
-        else this.tables.setAbsent(entry);
+        if (state === UNIFORM) states.setUniform(entry, this.bricks.bytes(entry));
+        else states.setAbsent(entry);
         continue;
       }
-      if (this.slots[entry] === NO_SLOT && !this.#settle(entry)) continue;
+      if (this.slots[entry] === NO_SLOT && !this.#settle(entry, states, atlas)) continue;
       places.push({ slot: this.slots[entry], entry });
     }
     // Those that had to make room for later ones of the same message lost their slots again
-    this.atlas.upload(places.filter(({ slot, entry }) => this.slots[entry] === slot), this.bricks);
-    this.tables.upload();
-    this.uniforms.atlas.value = this.atlas.texture;
+    atlas.upload(places.filter(({ slot, entry }) => this.slots[entry] === slot), this.bricks);
+    states.upload();
   }
 
   /**
    * Find a slot for an entry.
    *
    * @param {number} entry
+   * @param {States} states
+   * @param {Atlas} atlas
    */
-  #settle(entry) {
-    let slot = this.atlas.take();
+  #settle(entry, states, atlas) {
+    let slot = atlas.take();
+    if (slot < 0 && atlas.grow(() => this.#refill(atlas))) slot = atlas.take();
     if (slot < 0) {
       this.isCrowded = true;
-      if (!this.#evict()) {
-        this.tables.setAbsent(entry);
+      if (!this.#evict(states)) {
+        states.setAbsent(entry);
         return false;
       }
-      slot = this.atlas.take();
+      slot = atlas.take();
     }
     this.slots[entry] = slot;
     this.resident += 1;
-    this.tables.setBrick(entry, slotPlace(slot));
+    states.setBrick(entry, slotPlace(slot));
     return true;
   }
 
-  /** Take the least wanted brick off the card. */
-  #evict() {
+  /**
+   * Send up again all that has a slot.
+   *
+   * @param {Atlas} atlas
+   */
+  #refill(atlas) {
+    const places = [];
+    for (const [entry, slot] of this.slots.entries()) {
+      if (slot !== NO_SLOT) places.push({ slot, entry });
+    }
+    atlas.upload(places, this.bricks);
+  }
+
+  /**
+   * Take the least wanted brick off the card.
+   *
+   * @param {States} states
+   */
+  #evict(states) {
     while (this.order.length) {
       const entry = this.order[this.order.length - 1];
       this.order = this.order.subarray(0, -1);
       if (this.slots[entry] === NO_SLOT) continue;
       this.#release(entry);
-      this.tables.setAbsent(entry);
+      states.setAbsent(entry);
       return true;
     }
     return false;
@@ -187,7 +176,7 @@ export class PaintTexture {
   /** @param {number} entry */
   #release(entry) {
     if (this.slots[entry] === NO_SLOT) return;
-    this.atlas.give(this.slots[entry]);
+    this.atlas?.give(this.slots[entry]);
     this.slots[entry] = NO_SLOT;
     this.resident -= 1;
   }

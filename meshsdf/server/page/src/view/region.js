@@ -46,8 +46,9 @@ export class Region {
    * @param {import("./octree.js").Octree} octree
    * @param {(entry: number) => boolean} isBare whether coarser bricks show in an entry's place
    * @param {readonly {entry: number}[]} changed
+   * @param {number} spread how far beyond the bricks they may show
    */
-  addBricks(orbit, octree, isBare, changed) {
+  addBricks(orbit, octree, isBare, changed, spread) {
     if (changed.length > MOST_BRICKS) this.addAll();
     if (this.#all) return;
     const corner = new Vector3();
@@ -60,7 +61,9 @@ export class Region {
       const isSeen = level <= Math.ceil(Math.log2(Math.max(footprint, 1)));
       if (!isSeen && isCovered(octree, isBare, level, bx, by, bz)) continue;
       for (let n = 0; n < 8; n++) {
-        corner.set((bx + (n >> 2)) * size, (by + ((n >> 1) & 1)) * size, (bz + (n & 1)) * size);
+        const d = [n >> 2, (n >> 1) & 1, n & 1];
+        corner.set((bx + d[0]) * size, (by + d[1]) * size, (bz + d[2]) * size);
+        corner.add(new Vector3(...d).multiplyScalar(2).subScalar(1).multiplyScalar(spread));
         const { x, y, isBehind } = orbit.project(corner);
         if (isBehind) return this.addAll();
         this.#add(x, y);

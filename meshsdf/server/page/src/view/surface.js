@@ -1,9 +1,15 @@
-/** The mesh as it is drawn and hit: geometry with shading normals, and a tree of boxes over it. */
+/**
+ * The mesh as it is drawn and hit: geometry with shading normals, and a tree of boxes over it.
+ *
+ * What is drawn has enough vertices to be moved by heights; what is hit is the mesh itself.
+ */
 
 import { Box3, BufferAttribute, BufferGeometry, DoubleSide, Matrix4, Ray, Vector3 } from "three";
 import { MeshBVH, SAH } from "three-mesh-bvh";
 import { shadedMesh } from "./corner_normals.js";
+import { finerMesh, meanEdge } from "./finer_mesh.js";
 
+const EDGE = 2.5; // texels between vertices, if that does not make too many
 const SAH_MOST_FACES = 200_000; // above, a tree that is built faster
 
 /**
@@ -17,16 +23,17 @@ const SAH_MOST_FACES = 200_000; // above, a tree that is built faster
 export class Surface {
   /**
    * @param {ArrayBuffer} buffer as GET /api/mesh gives it
+   * @param {number} texel spacing of the finest texels
    */
-  constructor(buffer) {
+  constructor(buffer, texel) {
     const [nVertices, nFaces] = new Uint32Array(buffer, 0, 2);
     const positions = new Float32Array(buffer, 8, 3 * nVertices);
     const faces = new Uint32Array(buffer, 8 + 12 * nVertices, 3 * nFaces);
     const shaded = shadedMesh(positions, faces);
-    this.geometry = new BufferGeometry();
-    this.geometry.setAttribute("position", new BufferAttribute(shaded.positions, 3));
-    this.geometry.setAttribute("normal", new BufferAttribute(shaded.normals, 3));
-    this.geometry.setIndex(new BufferAttribute(shaded.index, 1));
+    const finer = finerMesh(shaded, EDGE * texel);
+    this.geometry = geometryOf(shaded);
+    this.drawn = finer === shaded ? this.geometry : geometryOf(finer);
+    this.edge = meanEdge(finer); // of what is drawn
     this.geometry.computeBoundingBox();
     this.geometry.computeBoundingSphere();
     const options = nFaces <= SAH_MOST_FACES ? { strategy: SAH } : {};
@@ -46,6 +53,28 @@ export class Surface {
     if (!found?.face) return null;
     const { point, face, distance } = found;
     return { point, distance, faceNormal: face.normal.clone(), normal: this.#normalAt(point, face) };
+  }
+
+  /**
+   * The place of the surface that is nearest to a point.
+   *
+   * @param {Vector3} point
+   * @returns {Hit | null}
+   */
+  nearest(point) {
+    const found = this.tree.closestPointToPoint(point);
+    if (!found) return null;
+    const [a, b, c] = [0, 1, 2].map((n) => this.#corner(3 * found.faceIndex + n));
+    const { position } = this.geometry.attributes;
+    const [pa, pb, pc] = [a, b, c].map((v) => new Vector3().fromBufferAttribute(position, v));
+    const normal = pb.sub(pa).cross(pc.sub(pa)).normalize();
+    const place = found.point.clone();
+    return {
+      point: place,
+      distance: found.distance,
+      faceNormal: normal.clone(),
+      normal: this.#normalAt(place, { a, b, c, normal }),
+    };
   }
 
   /**
@@ -75,9 +104,25 @@ export class Surface {
     return mean.lengthSq() > 0.01 ? mean.normalize() : normal.clone();
   }
 
+  /** @param {number} n */
+  #corner(n) {
+    return /** @type {BufferAttribute} */ (this.geometry.index).getX(n);
+  }
+
   dispose() {
     this.geometry.dispose();
+    this.drawn.dispose();
   }
+}
+
+/** @param {import("./corner_normals.js").Shaded} mesh */
+function geometryOf({ positions, normals, away, index }) {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(positions, 3));
+  geometry.setAttribute("normal", new BufferAttribute(normals, 3));
+  geometry.setAttribute("away", new BufferAttribute(away, 3));
+  geometry.setIndex(new BufferAttribute(index, 1));
+  return geometry;
 }
 
 /**

@@ -1,6 +1,6 @@
 /**
  * The octree's tables as textures of whole numbers: pages, groups and sheets stay as they are;
- * what every entry shows changes, and only those rows go up that did.
+ * what every entry shows in a picture changes, and only those rows go up that did.
  */
 
 import { Box2, DataTexture, IntType, NearestFilter, RGIntegerFormat, RedIntegerFormat, ShortType, UnsignedIntType, Vector2 } from "three"; // prettier-ignore
@@ -11,13 +11,13 @@ const WIDTH = 1 << SHIFT;
 const UNIFORM_BIT = 0x40000000;
 const BRICK_BIT = 0x80000000;
 
+/** What all pictures share. */
 export class Tables {
   /**
    * @param {import("three").WebGLRenderer} renderer
    * @param {import("./octree.js").Octree} octree
    */
   constructor(renderer, octree) {
-    this.renderer = renderer;
     const gl = /** @type {WebGL2RenderingContext} */ (renderer.getContext());
     const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     const rows = Math.max(octree.pages.length, octree.nEntries) / WIDTH;
@@ -28,13 +28,28 @@ export class Tables {
     this.pages = table(octree.pages, Int32Array, 1, RedIntegerFormat, IntType);
     this.groups = table(octree.groups, Int32Array, 2, RGIntegerFormat, IntType);
     this.sheets = table(octree.sheets, Int16Array, 2, RGIntegerFormat, ShortType);
-    const states = new Uint32Array(2 * octree.nEntries);
-    this.states = table(states, Uint32Array, 2, RGIntegerFormat, UnsignedIntType);
-    const { data, width, height } = this.states.image;
+    for (const one of [this.pages, this.groups, this.sheets]) renderer.initTexture(one);
+  }
+
+  dispose() {
+    for (const one of [this.pages, this.groups, this.sheets]) one.dispose();
+  }
+}
+
+/** What every entry shows in one picture. */
+export class States {
+  /**
+   * @param {import("three").WebGLRenderer} renderer
+   * @param {number} nEntries
+   */
+  constructor(renderer, nEntries) {
+    this.renderer = renderer;
+    this.texture = table(new Uint32Array(2 * nEntries), Uint32Array, 2, RGIntegerFormat, UnsignedIntType);
+    const { data, width, height } = this.texture.image;
     this.words = /** @type {Uint32Array} */ (data);
     this.bytes = new Uint8Array(this.words.buffer);
     this.source = new DataTexture(this.words, width, height, RGIntegerFormat, UnsignedIntType);
-    for (const one of [this.pages, this.groups, this.sheets, this.states]) renderer.initTexture(one);
+    renderer.initTexture(this.texture);
     /** @type {Map<number, [number, number]>} first and last changed number of rows */
     this.changed = new Map();
   }
@@ -47,11 +62,11 @@ export class Tables {
 
   /**
    * @param {number} entry
-   * @param {Uint8Array} color four bytes
+   * @param {Uint8Array} bytes four, as they came
    */
-  setUniform(entry, color) {
+  setUniform(entry, bytes) {
     this.words[2 * entry] = UNIFORM_BIT;
-    this.bytes.set(color, 8 * entry + 4);
+    this.bytes.set(bytes, 8 * entry + 4);
     this.#mark(entry);
   }
 
@@ -69,13 +84,13 @@ export class Tables {
   upload() {
     for (const [row, [first, last]] of this.changed) {
       const box = new Box2(new Vector2(first, row), new Vector2(last + 1, row + 1));
-      this.renderer.copyTextureToTexture(this.source, this.states, box, box.min);
+      this.renderer.copyTextureToTexture(this.source, this.texture, box, box.min);
     }
     this.changed.clear();
   }
 
   dispose() {
-    for (const one of [this.pages, this.groups, this.sheets, this.states]) one.dispose();
+    this.texture.dispose();
   }
 
   /** @param {number} entry */

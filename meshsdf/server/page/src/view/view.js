@@ -1,38 +1,25 @@
 /** The painted model on the canvas: drawn when something changed, and only then. */
 
-import { DoubleSide, Frustum, GLSL3, Matrix4, Mesh, RawShaderMaterial, Scene, Vector3, WebGLRenderer } from "three"; // prettier-ignore
+import { Frustum, Matrix4, Scene, WebGLRenderer } from "three";
 import { requestBytes } from "../net/api.js";
 import { toast } from "../store.js";
 import { DABBING } from "../tool.js";
-import { Cursor, MOST_CURSORS } from "./cursor.js";
+import { CARD_LOST, NO_WEBGL } from "../troubles.js";
+import { Cursor } from "./cursor.js";
 import { Gestures } from "./gestures.js";
+import { Model } from "./model.js";
 import { decodeOctree } from "./octree.js";
 import { Orbit } from "./orbit.js";
-import { PAINT_FRAGMENT, PAINT_VERTEX } from "./paint_shader.js";
-import { PaintTexture } from "./paint_texture.js";
+import { Pace } from "./pace.js";
 import { Region } from "./region.js";
-import { Surface } from "./surface.js";
 
-/** @typedef {import("../store.js").Vec3} Vec3 */
-/** @typedef {import("./surface.js").Hit} Hit */
+/** @typedef {import("../net/protocol.js").Brick} Brick */
+/** @typedef {import("../net/protocol.js").PictureName} PictureName */
 
-const CLAY = [0.4, 0.45, 0.52]; // linear: what is seen where nothing is painted
 const MOST_RATIO = 2; // pixels of the canvas for one of the page
 const REST = 250; // milliseconds without a change of the camera
-const SLOW = 45; // milliseconds between frames from which on they are drawn coarser in motion
-const COARSER = 0.5; // of the pixels along a side
 const QUIET = 400; // milliseconds after which all is drawn once more
 const LOST_FOR = 8000; // milliseconds after which a lost card is not waited for any more
-const SHOWS = ["color", "flat", "normal"]; // numbers of the shader's ``show``
-
-const NO_WEBGL = {
-  what: "this browser cannot draw the model: WebGL 2 is missing or turned off",
-  fix: "turn on hardware acceleration in its settings, or open the address in a current Chrome, Edge, Firefox or Safari",
-};
-const CARD_LOST = {
-  what: "the graphics card stopped drawing",
-  fix: "reload the page; nothing that was painted is lost",
-};
 
 export class View {
   /**
@@ -57,30 +44,23 @@ export class View {
     this.scene = new Scene();
     this.scene.matrixWorldAutoUpdate = false;
     this.cursor = new Cursor();
-    /** @type {import("../net/protocol.js").Brick[][]} that came before there was a texture */
+    /** @type {[Brick[], PictureName][]} that came before there was a model */
     this.early = [];
-    /** @type {PaintTexture | null} */
-    this.texture = null;
-    /** @type {Surface | null} */
-    this.surface = null;
+    /** @type {Model | null} */
+    this.model = null;
     /** @type {Orbit | null} */
     this.orbit = null;
     /** @type {Gestures | null} */
     this.gestures = null;
-    /** @type {RawShaderMaterial | null} */
-    this.material = null;
     /** @type {{x: number, y: number} | null} where the pointer hovers */
     this.spot = null;
     this.region = new Region();
-    /** @type {Map<number, boolean>} entries whose bricks the surface passes through, or not */
-    this.passed = new Map();
     this.frame = 0;
     this.frames = 0;
     this.parts = 0; // of these, those that drew a part
     this.time = 0;
     this.isLost = false;
-    this.isCoarse = false;
-    this.slowFrames = 0; // in a row
+    this.pace = new Pace();
     this.isCameraNew = true;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.rest = undefined;
@@ -88,7 +68,7 @@ export class View {
     this.settling = undefined;
     /** @type {(() => void)[]} */
     this.endings = [];
-    session.onBricks((bricks) => this.#take(bricks));
+    session.onBricks((bricks, picture) => this.#take(bricks, picture));
     this.#watch();
     session.ready.then((facts) => this.#load(facts)).catch((error) => this.#failed(error));
   }
@@ -100,6 +80,7 @@ export class View {
     for (const key of /** @type {const} */ (["view", "tool", "placing"])) {
       this.endings.push(this.store.on(key, () => this.redraw()));
     }
+    this.endings.push(this.store.on("stroking", (is) => this.model?.hold(is)));
     this.canvas.addEventListener("webglcontextlost", (event) => this.#lose(event));
     this.canvas.addEventListener("webglcontextrestored", () => this.#restore());
   }
@@ -108,30 +89,13 @@ export class View {
   async #load(facts) {
     this.store.set({ progress: { what: "Loading the model", share: null } });
     const [mesh, octree] = await Promise.all([requestBytes("/api/mesh"), requestBytes("/api/octree")]);
-    this.surface = new Surface(mesh);
-    this.texture = new PaintTexture(this.renderer, decodeOctree(octree));
-    for (const bricks of this.early.splice(0)) this.texture.take(bricks);
     this.cursor.origin.fromArray(facts.origin ?? [0, 0, 0]);
-    const [r, g, b, a] = facts.base_color ?? [0, 0, 0, 0];
-    const bare = [r, g, b].map((value, n) => value * a + (1 - a) * CLAY[n]);
-    this.material = new RawShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: PAINT_VERTEX,
-      fragmentShader: PAINT_FRAGMENT,
-      side: DoubleSide,
-      defines: { ...this.texture.defines, CURSORS: MOST_CURSORS },
-      uniforms: {
-        ...this.texture.uniforms,
-        ...this.cursor.uniforms,
-        show: { value: 0 },
-        wireframe: { value: false },
-        bare: { value: bare },
-      },
-    });
-    const model = new Mesh(this.surface.geometry, this.material);
-    model.frustumCulled = false;
-    this.scene.add(model);
-    this.orbit = new Orbit(this.surface.center, this.surface.radius);
+    const model = new Model(this.renderer, mesh, decodeOctree(octree), facts, this.cursor);
+    for (const [bricks, picture] of this.early.splice(0)) model.painting.take(bricks, picture);
+    this.model = model;
+    this.scene.add(model.object);
+    this.#tellReach();
+    this.orbit = new Orbit(model.surface.center, model.surface.radius);
     this.gestures = new Gestures({
       canvas: this.canvas,
       store: this.store,
@@ -141,7 +105,7 @@ export class View {
         hit: (x, y) => this.hit(x, y),
         pixelAt: (hit) => /** @type {Orbit} */ (this.orbit).pixelAt(hit.point),
       },
-      colorAt: (hit) => this.#visibleColor(hit),
+      colorAt: (hit) => model.visibleColor(hit),
       hover: (spot) => this.#hover(spot),
       moved: () => this.turn(() => {}),
     });
@@ -157,42 +121,31 @@ export class View {
     this.store.set({ progress: null, fatal: words });
   }
 
-  /** @param {import("../net/protocol.js").Brick[]} bricks */
-  #take(bricks) {
-    if (!this.texture) {
-      this.early.push(bricks);
+  /**
+   * @param {Brick[]} bricks
+   * @param {PictureName} picture
+   */
+  #take(bricks, picture) {
+    const { model, orbit, region } = this;
+    if (!model) {
+      this.early.push([bricks, picture]);
       return;
     }
-    if (this.isLost) {
-      for (const brick of bricks) this.texture.bricks.put(brick);
-      return;
-    }
-    this.texture.take(bricks);
-    if (this.texture.isCrowded) this.#chooseSoon();
-    const { orbit, texture } = this;
-    const isBare = (/** @type {number} */ entry) => this.#isBare(entry);
-    if (orbit) this.region.addBricks(orbit, texture.octree, isBare, bricks);
+    if (this.isLost) return model.painting.keep(bricks, picture);
+    const before = model.painting.reach;
+    model.painting.take(bricks, picture);
+    if (model.painting.isCrowded) this.#chooseSoon();
+    const isBare = (/** @type {number} */ entry) => model.isBare(entry, picture);
+    const spread = Math.max(model.spread(picture), before * model.octree.texel);
+    if (orbit) region.addBricks(orbit, model.octree, isBare, bricks, spread);
+    if (model.painting.reach !== before) this.#tellReach();
     this.schedule();
   }
 
-  /**
-   * Whether coarser bricks show in the place of an entry. Some entries never have a brick, since they
-   * only hold nodes of cells beside them: nothing of the surface lies there.
-   *
-   * @param {number} entry
-   */
-  #isBare(entry) {
-    const { surface, texture } = this;
-    if (!surface || !texture || texture.bricks.has(entry)) return false;
-    const { octree } = texture;
-    let passes = this.passed.get(entry);
-    if (passes === undefined) {
-      const size = 8 * octree.texel * 2 ** octree.levels[entry];
-      const corner = new Vector3(...octree.bricks.subarray(3 * entry, 3 * entry + 3));
-      passes = surface.passes(corner.multiplyScalar(size), size);
-      this.passed.set(entry, passes);
-    }
-    return passes;
+  /** Another largest height has other colours, and another legend. */
+  #tellReach() {
+    this.store.set({ reach: this.model?.painting.reach ?? 0 });
+    if (this.store.get().view.show === "displacement") this.region.addAll();
   }
 
   /** Draw all at the next chance. */
@@ -227,48 +180,33 @@ export class View {
   /** @param {number} time */
   #tick(time) {
     this.frame = 0;
-    const { orbit, texture } = this;
-    if (!orbit || !texture) return;
+    const { orbit, model, pace } = this;
+    if (!orbit || !model) return;
     const elapsed = this.time ? Math.min(time - this.time, 100) : 16;
     const isMoving = orbit.step(elapsed);
     this.#aim();
     if (this.isCameraNew) this.#chooseSoon();
     this.isCameraNew = isMoving;
-    const isFilling = texture.fill();
-    this.#pace(isMoving ? elapsed : 0);
+    const isFilling = model.painting.fill();
+    if (pace.step(isMoving ? elapsed : 0)) {
+      this.#setRatio();
+      this.region.addAll();
+    }
     if (isMoving || isFilling) this.region.addAll();
     this.draw(this.region.take(orbit.width, orbit.height));
     this.time = isMoving || isFilling ? time : 0;
     if (isMoving || isFilling) this.schedule();
   }
 
-  /**
-   * Draw fewer pixels while the camera moves, if the machine is slow, and all when it stands.
-   *
-   * @param {number} elapsed milliseconds since the last frame of a motion; 0 if it is over
-   */
-  #pace(elapsed) {
-    this.slowFrames = elapsed > SLOW ? this.slowFrames + 1 : 0;
-    const wanted = elapsed && (this.isCoarse || this.slowFrames > 2);
-    if (Boolean(wanted) === this.isCoarse) return;
-    this.isCoarse = Boolean(wanted);
-    this.#setRatio();
-    this.region.addAll();
-  }
-
   #setRatio() {
-    const ratio = Math.min(devicePixelRatio, MOST_RATIO) * (this.isCoarse ? COARSER : 1);
-    this.renderer.setPixelRatio(ratio);
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MOST_RATIO) * this.pace.share);
   }
 
   /** @param {"all" | import("./region.js").Part | null} part */
   draw(part) {
-    const { material, orbit, renderer } = this;
-    if (!part || !material || !orbit || this.isLost) return;
-    const { show, lit, wireframe } = this.store.get().view;
-    const kind = show === "color" && !lit ? "flat" : show;
-    material.uniforms.show.value = Math.max(SHOWS.indexOf(kind), 0);
-    material.uniforms.wireframe.value = wireframe;
+    const { model, orbit, renderer } = this;
+    if (!part || !model || !orbit || this.isLost) return;
+    model.dress(this.store.get().view);
     clearTimeout(this.settling);
     renderer.setScissorTest(part !== "all");
     if (part !== "all") {
@@ -283,20 +221,22 @@ export class View {
 
   /** Put the cursor where the pointer is, and tell where one looks. */
   #aim() {
-    const { spot, store, orbit, texture } = this;
-    if (!orbit || !texture) return;
+    const { spot, store, orbit, model } = this;
+    if (!orbit || !model) return;
     const { tool, view, placing, cursor } = store.get();
     const isFree = view.drag !== "orbit" && !placing;
     const hit = spot ? this.hit(spot.x, spot.y) : null;
     const pixel = hit ? orbit.pixelAt(hit.point) : 0;
-    this.cursor.mark(this.region, orbit);
+    const spread = model.spread("base");
+    this.cursor.mark(this.region, orbit, spread);
     const hasSize = DABBING.includes(tool?.kind ?? "");
     this.cursor.show(isFree ? hit : null, tool, pixel, hasSize);
-    this.cursor.mark(this.region, orbit);
+    this.cursor.mark(this.region, orbit, spread);
     this.canvas.dataset.cursor = hit && isFree ? "brush" : "view";
     const point = hit?.point.toArray() ?? null;
     if (hit && point) {
-      store.set({ cursor: { point, normal: hit.normal.toArray(), spacing: this.spacing(hit) } });
+      const height = model.heightAt(hit);
+      store.set({ cursor: { point, normal: hit.normal.toArray(), spacing: model.spacing(hit), height } });
     } else if (cursor) store.set({ cursor: null });
     if (this.isCameraNew || hit || cursor) {
       this.session.view(orbit.camera.position.toArray(), point);
@@ -323,13 +263,13 @@ export class View {
   #chooseSoon() {
     clearTimeout(this.rest);
     this.rest = setTimeout(() => {
-      if (!this.texture || !this.orbit || this.isLost) return;
+      if (!this.model || !this.orbit || this.isLost) return;
       const { camera } = this.orbit;
       const matrix = new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
       const planes = new Frustum().setFromProjectionMatrix(matrix).planes;
       const flat = planes.flatMap(({ normal, constant }) => [...normal.toArray(), constant]);
-      this.texture.choose({ eye: camera.position.toArray(), planes: Float32Array.from(flat) });
-      if (this.texture.missing.length) this.schedule();
+      const sight = { eye: camera.position.toArray(), planes: Float32Array.from(flat) };
+      if (this.model.painting.choose(sight)) this.schedule();
     }, REST);
   }
 
@@ -347,7 +287,7 @@ export class View {
   #restore() {
     this.isLost = false;
     try {
-      this.texture?.allocate(this.renderer);
+      this.model?.painting.allocate();
     } catch (error) {
       return this.#failed(error);
     }
@@ -360,29 +300,8 @@ export class View {
    * @param {number} y from its top
    */
   hit(x, y) {
-    if (!this.orbit || !this.surface) return null;
-    return this.surface.hit(this.orbit.ray(x, y));
-  }
-
-  /** @param {Hit} hit */
-  look(hit) {
-    return this.texture?.colorAt(hit.point.toArray(), hit.faceNormal.toArray()) ?? null;
-  }
-
-  /** @param {Hit} hit */
-  spacing(hit) {
-    const texture = /** @type {PaintTexture} */ (this.texture);
-    return texture.octree.texel * 2 ** (this.look(hit)?.level ?? texture.octree.nLevels - 1);
-  }
-
-  /**
-   * @param {Hit} hit
-   * @returns {Vec3}
-   */
-  #visibleColor(hit) {
-    const [r, g, b, a] = this.look(hit)?.color ?? [0, 0, 0, 0];
-    const bare = this.material?.uniforms.bare.value ?? CLAY;
-    return [r + (1 - a) * bare[0], g + (1 - a) * bare[1], b + (1 - a) * bare[2]];
+    if (!this.orbit || !this.model) return null;
+    return this.model.hit(this.orbit.ray(x, y));
   }
 
   dispose() {
@@ -391,9 +310,7 @@ export class View {
     clearTimeout(this.settling);
     for (const end of this.endings) end();
     this.gestures?.dispose();
-    this.texture?.dispose();
-    this.surface?.dispose();
-    this.material?.dispose();
+    this.model?.dispose();
     this.renderer.dispose();
   }
 }

@@ -3,6 +3,7 @@
 import { Orbit } from "./orbit.js";
 import { View } from "./view.js";
 
+/** @typedef {import("../net/protocol.js").PictureName} PictureName */
 /** @typedef {import("../store.js").Vec3} Vec3 */
 
 /**
@@ -26,7 +27,10 @@ import { View } from "./view.js";
  *     color: number[]} | null} exactColor linear, premultiplied, from the bricks themselves
  * @property {() => {width: number, height: number, data: Uint8Array}} pixels drawn anew without
  *     the cursor; RGBA, the lowest row first
- * @property {() => Promise<string>} digest of all bricks, as GET /api/digest has it under "shown"
+ * @property {(clientX: number, clientY: number) => number | null} exactHeight in finest texels, from
+ *     the bricks themselves
+ * @property {(picture?: PictureName) => Promise<string>} digest of all bricks of a picture, as GET
+ *     /api/digest has it; of the colours, which it calls "shown", if not said
  * @property {() => Record<string, number>} stats
  * @property {() => void} dispose
  */
@@ -49,7 +53,8 @@ export function createViewer(canvas, store, session) {
     renderedEntries: () => renderedEntries(view),
     exactColor: (x, y) => exactColor(view, x, y),
     pixels: () => pixels(view),
-    digest: () => digest(view),
+    exactHeight: (x, y) => exactHeight(view, x, y),
+    digest: (picture = "base") => digest(view, picture),
     stats: () => stats(view),
     dispose: () => view.dispose(),
   };
@@ -73,8 +78,9 @@ function hitOnPage(view, clientX, clientY) {
  */
 function pick(view, x, y) {
   const hit = hitOnPage(view, x, y);
-  if (!hit) return null;
-  return { point: hit.point.toArray(), normal: hit.normal.toArray(), spacing: view.spacing(hit) };
+  if (!hit || !view.model) return null;
+  const { point, normal } = hit;
+  return { point: point.toArray(), normal: normal.toArray(), spacing: view.model.spacing(hit) };
 }
 
 /**
@@ -85,8 +91,18 @@ function pick(view, x, y) {
 function exactColor(view, x, y) {
   const hit = hitOnPage(view, x, y);
   if (!hit) return null;
-  const color = view.look(hit)?.color ?? [0, 0, 0, 0];
+  const color = view.model?.look(hit)?.values ?? [0, 0, 0, 0];
   return { point: hit.point.toArray(), faceNormal: hit.faceNormal.toArray(), color };
+}
+
+/**
+ * @param {View} view
+ * @param {number} x
+ * @param {number} y
+ */
+function exactHeight(view, x, y) {
+  const hit = hitOnPage(view, x, y);
+  return hit && (view.model?.heightAt(hit) ?? null);
 }
 
 /** @param {View} view */
@@ -107,7 +123,8 @@ function camera(view) {
 /** @param {View} view */
 function renderedEntries(view) {
   const found = [];
-  for (const [entry, slot] of view.texture?.slots.entries() ?? []) if (slot >= 0) found.push(entry);
+  const slots = view.model?.painting.base.slots.entries() ?? [];
+  for (const [entry, slot] of slots) if (slot >= 0) found.push(entry);
   return found;
 }
 
@@ -127,21 +144,29 @@ function pixels(view) {
 }
 
 /** @param {View} view */
-function stats({ frame, frames, parts, texture }) {
+function stats({ frame, frames, parts, model }) {
+  const base = model?.painting.base;
+  const heights = model?.painting.pictures.height;
   return {
     frames,
     parts,
-    bricks: texture?.bricks.count ?? 0,
-    resident: texture?.resident ?? 0,
-    capacity: texture?.atlas.capacity ?? 0,
-    levels: texture?.octree.nLevels ?? 0,
+    bricks: base?.bricks.count ?? 0,
+    resident: base?.resident ?? 0,
+    capacity: base?.atlas?.capacity ?? 0,
+    heights: heights?.bricks.count ?? 0,
+    residentHeights: heights?.resident ?? 0,
+    heightRoom: heights?.atlas?.room ?? 0,
+    levels: model?.octree.nLevels ?? 0,
     isMoving: Number(frame !== 0),
   };
 }
 
-/** @param {View} view */
-async function digest({ texture }) {
-  const content = texture?.bricks.content() ?? new Uint8Array(0);
+/**
+ * @param {View} view
+ * @param {PictureName} picture
+ */
+async function digest({ model }, picture) {
+  const content = model?.painting.pictures[picture].bricks.content() ?? new Uint8Array(0);
   const hash = new Uint8Array(await crypto.subtle.digest("SHA-256", content));
   return Array.from(hash, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
