@@ -34,7 +34,7 @@ BEFORE = """
   };
 """
 
-# Every few pixels, away from the rims: the point under it, the face's normal, and what is drawn
+# Every few pixels, away from the rims: the point under it, the face's normal, what is drawn, where
 LOOK = """(step) => {
   const { width, height, data } = meshsdf.viewer.pixels();
   const canvas = document.getElementById("canvas").getBoundingClientRect();
@@ -46,7 +46,9 @@ LOOK = """(step) => {
       const place = [canvas.left + ((x + 0.5) * canvas.width) / width,
         canvas.top + ((y + 0.5) * canvas.height) / height];
       const found = meshsdf.viewer.exactColor(...place);
-      if (found) rows.push([...found.point, ...found.faceNormal, ...data.subarray(at, at + 3)]);
+      if (!found) continue;
+      const pixel = [...data.subarray(at, at + 3), height - 1 - y, x];
+      rows.push([...found.point, ...found.faceNormal, ...pixel]);
     }
   }
   return rows;
@@ -115,8 +117,12 @@ class Painted:
 
     def look(self, step: int = 5) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points and face normals in the wire's coordinates, and bytes drawn there, unlit."""
+        return self.look_at_pixels(step)[:3]
+
+    def look_at_pixels(self, step: int = 5) -> tuple[np.ndarray, ...]:
+        """The same, and which rows and columns of `drawn` these are."""
         rows = np.array(self.ask(LOOK, step))
-        return rows[:, :3], rows[:, 3:6], rows[:, 6:]
+        return rows[:, :3], rows[:, 3:6], rows[:, 6:9], rows[:, 9:].astype(int)
 
     def drawn(self) -> np.ndarray:
         """The canvas as it stands."""

@@ -34,7 +34,7 @@ export class Model {
     this.held = null;
     /** @type {Map<number, boolean>} entries whose bricks the surface passes through, or not */
     this.passed = new Map();
-    const level = Math.ceil(Math.log2(this.surface.edge / octree.texel));
+    const level = Math.round(Math.log2(this.surface.edge / octree.texel));
     this.uniforms = {
       reach: { value: 0 },
       moveLevel: { value: Math.min(Math.max(level, 0), octree.nLevels - 1) },

@@ -9,7 +9,7 @@ import { MeshBVH, SAH } from "three-mesh-bvh";
 import { shadedMesh } from "./corner_normals.js";
 import { finerMesh, meanEdge } from "./finer_mesh.js";
 
-const EDGE = 2.5; // texels between vertices, if that does not make too many
+const EDGE = 2; // texels between vertices, if that does not make too many
 const SAH_MOST_FACES = 200_000; // above, a tree that is built faster
 
 /**
