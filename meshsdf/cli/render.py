@@ -141,6 +141,11 @@ def command(
         painted = None if texture is None else _texture(texture, console)
         loaded = painted.surface if mesh == texture else _read(mesh, console)
         other = error_of and read_mesh(error_of, warn=console.warn)
+        if painted is not None and mesh != texture:
+            from ..texture.fit import require_fit
+
+            where = f"mesh {mesh}, texture {texture}"
+            require_fit(painted, loaded, where=where, warn=console.warn)
     with console.stage("render"):
         if other:
             title = f"distance to {Path(error_of).name}, world units"

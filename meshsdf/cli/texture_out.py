@@ -48,12 +48,14 @@ def laid_options(function: Callable) -> Callable:
 def apply(texture: str, mesh: str, out: str, at_vertices, size, atlas, time_limit, force, as_json):
     """Give MESH the colours of TEXTURE (.mtex), OUT (.glb, .obj or .ply).
 
-    MESH may be any mesh of the textured surface: another resolution, remeshed, with other UVs.
+    MESH may be any mesh of the textured surface: another resolution, remeshed, with other UVs. One
+    that lies mostly elsewhere is refused; how much lies elsewhere is told.
     """
     console = Console("texture-apply", as_json=as_json)
     console.watch_compilation()
     from ..io import check_input, check_output, read_mesh, write_mesh
     from ..io.texture_files import Layout, colored_mesh, words_of
+    from ..texture.fit import require_fit
     from ..texture.journal import Project
 
     check_input(mesh, kind="mesh")
@@ -62,6 +64,8 @@ def apply(texture: str, mesh: str, out: str, at_vertices, size, atlas, time_limi
         loaded = read_mesh(mesh, warn=console.warn)
         project = Project.open(texture, warn=console.warn)
     with project, console.stage("colours"):
+        where = f"mesh {mesh}, texture {texture}"
+        require_fit(project.texture, loaded, where=where, warn=console.warn)
         layout = Layout(size, atlas, time_limit)
         colored, facts = colored_mesh(
             project.texture, loaded, out, at_vertices=at_vertices, layout=layout, warn=console.warn

@@ -9,6 +9,7 @@ from PIL import Image
 from meshsdf.io import read_mesh, write_mesh
 from meshsdf.io.pictures import read_picture
 from meshsdf.io.vdb import read_vdb_grids
+from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh, icosphere
 from meshsdf.srgb import srgb_rgba
 from meshsdf.texture.atlas import atlas_for, textured, vertex_colored
@@ -185,6 +186,29 @@ def test_a_picture_shows_the_texture(cli, mesh, tmp_path):
     first, second = (np.asarray(Image.open(tmp_path / f"{k}.png")).astype(int) for k in (0, 1))
     assert np.abs(first - second).max() <= 3
     assert cli("render", mesh, tmp_path / "x.png", "--texture", mesh, "--error-of", mesh).code == 2
+
+
+def test_a_mesh_that_the_texture_does_not_fit_is_refused_or_told(cli, mesh, tmp_path):
+    made = tmp_path / "red.mtex"
+    assert cli("texture", "procedural", mesh, made, "--resolution", 32).code == 0
+    other, out = ball(tmp_path / "other.ply", radius=9.0), tmp_path / "out.ply"
+    for words in (["texture", "apply", made, other, out], ["render", other, tmp_path / "x.png"]):
+        options = ["--texture", made] if words[0] == "render" else []
+        outcome = cli(*words, *options, "--force")
+        assert outcome.code == 3
+        assert "100 % of the mesh's area lies farther than 1 (8 texels)" in outcome.err
+        assert f"where: mesh {other}, texture {made}" in outcome.err
+        assert "made around another mesh" in outcome.err
+    assert not out.exists()
+    vertices = read_mesh(mesh).vertices
+    partly = vertices * np.where(vertices[:, 1:2] > 1.0, [1.0, 2.0, 1.0], 1.0)
+    write_mesh(other, Mesh(partly, read_mesh(mesh).faces), force=True)
+    outcome = cli("texture", "apply", made, other, out, "--json")
+    assert outcome.code == 0
+    (warning,) = outcome.json["warnings"]
+    assert "as far as 1.9" in warning
+    assert "it gets no colour there" in warning
+    assert cli("texture", "apply", made, mesh, out, "--json", "--force").json["warnings"] == []
 
 
 def test_a_stroke_of_height_moves_the_exported_mesh(cli, mesh, tmp_path):
