@@ -14,7 +14,7 @@ def convert_mesh(console: Console, mesh: str, out: str, options: dict) -> int:
     """Convert as the options of `convert` say; return the exit code."""
     from ..io import check_input, check_volume_output, read_mesh, stored_bytes
     from ..mesh.two_set import check
-    from ..sdf import choose_sign, resolve_voxel_size
+    from ..sdf import choose_sign, resolve_voxel_size, small_words
 
     resolution, voxel_size = options["resolution"], options["voxel_size"]
     if voxel_size is None and resolution is None:
@@ -29,6 +29,8 @@ def convert_mesh(console: Console, mesh: str, out: str, options: dict) -> int:
         report = check(loaded, self_intersections=False)
         size = resolve_voxel_size(loaded, resolution, voxel_size)
         choice = choose_sign(report, options["sign"], voxel_size=size)
+    for warning in small_words(loaded, size, choice.method):
+        console.warn(warning)
     measuring = {
         "resolution": resolution,
         "voxel_size": voxel_size,

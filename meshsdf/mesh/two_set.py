@@ -26,10 +26,11 @@ from .crack_repair import CrackRepair, close_cracks
 from .edge_chain import residual_lines
 from .edge_table import EdgeTable, edge_table
 from .faces import degenerate_faces, face_sheets
+from .flatness import is_flat
 from .holes import trace_holes
 from .mesh import Mesh
 from .self_intersections import find_self_intersections
-from .two_set_report import Sign, TwoSetReport
+from .two_set_report import FLAT, Sign, TwoSetReport
 
 SOUP = 0.5  # a mesh with more than this share of its edges open bounds nothing worth a sign
 
@@ -77,6 +78,7 @@ def check(
         "oriented": lines is None or lines.is_balanced(),
         "open_edge_share": n_open / max(1, table.n_edges),
         "n_orientation_conflicts": table.n_conflicts,
+        "flat": is_flat(points, faces, closed=len(segments) == 0),
     }
     sign, reason = _recommend(**facts, repair=repair)
     components = describe_components(points, faces, table, lines)
@@ -133,9 +135,12 @@ def _recommend(
     oriented: bool,
     open_edge_share: float,
     n_orientation_conflicts: int,
+    flat: bool,
     repair: CrackRepair | None,
 ) -> tuple[Sign, str]:
     """Choose the sign method that the facts allow, and say why."""
+    if flat and open_edge_share <= SOUP:
+        return "unsigned", FLAT
     if oriented:
         return "winding", "closed and consistently oriented: winding numbers are whole numbers"
     if two_set:

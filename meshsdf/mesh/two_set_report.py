@@ -10,6 +10,7 @@ from .holes import Hole
 from .self_intersections import SelfIntersections
 
 Sign = Literal["winding", "parity", "unsigned"]
+FLAT = "all faces lie in one plane: the mesh has no thickness, so nothing is inside"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,8 @@ class TwoSetReport:
         Whose faces form neither one cycle nor one fan, after welding.
     n_orientation_conflicts : int
         Edges with an even number of faces that use it unequally often each way.
+    flat : bool
+        All faces lie in one plane, within rounding (see `is_flat`): nothing is inside.
     self_intersections : SelfIntersections or None
         Information only; None when not asked for.
     recommended_sign : "winding", "parity" or "unsigned"
@@ -92,6 +95,7 @@ class TwoSetReport:
     n_nonmanifold_edges: int
     n_nonmanifold_vertices: int
     n_orientation_conflicts: int
+    flat: bool
     self_intersections: SelfIntersections | None
     recommended_sign: Sign
     recommended_sign_reason: str

@@ -4,7 +4,7 @@ from math import isfinite
 
 import numpy as np
 
-from .two_set_report import TwoSetReport
+from .two_set_report import FLAT, TwoSetReport
 
 
 def report_to_json(report: TwoSetReport) -> dict:
@@ -61,6 +61,8 @@ def describe_report(report: TwoSetReport) -> str:
     verdict = _closed_words(report) if report.two_set else _open_words(report)
     sentences = [*verdict, *_part_words(report), *_face_words(report), *_crossing_words(report)]
     reason = report.recommended_sign_reason
+    if report.flat and reason != FLAT:
+        sentences.append(f"{FLAT}.".capitalize())
     sentences.append(f"convert will {_METHOD[report.recommended_sign]}: {reason}.")
     return "\n".join(sentences)
 

@@ -6,7 +6,7 @@ from .mesh_distance import MeshDistance, PointDistances
 from .narrow_band import mesh_to_band
 from .normalization import Normalization, normalization
 from .samples import Samples, deepsdf_counts, sample_distances
-from .sign import SignChoice, choose_sign
+from .sign import SignChoice, choose_sign, small_words
 from .union import union_words
 
 __all__ = [
@@ -22,5 +22,6 @@ __all__ = [
     "normalization",
     "resolve_voxel_size",
     "sample_distances",
+    "small_words",
     "union_words",
 ]

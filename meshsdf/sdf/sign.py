@@ -5,7 +5,8 @@ from typing import Literal
 
 from ..arrays import Number
 from ..errors import SdfError
-from ..mesh.two_set import TwoSetReport
+from ..mesh import Mesh
+from ..mesh.two_set_report import FLAT, TwoSetReport
 
 CRACK_SHARE = 0.5  # of a voxel: wider cracks could be seen by a node, and get winding numbers
 
@@ -71,7 +72,7 @@ def choose_sign(
             sign, reason = "winding", "its cracks are too wide for these voxels"
     warnings = _crack_warnings(report) if zipped and sign != "unsigned" else ()
     if sign == "unsigned":
-        return SignChoice("unsigned", False, reason, ("distances carry no sign",))
+        return SignChoice("unsigned", False, reason, (_unsigned_words(report),))
     if sign == "parity":
         if not closed:
             raise SdfError(
@@ -83,6 +84,39 @@ def choose_sign(
     if oriented:
         return SignChoice("winding", True, reason, warnings)
     return SignChoice("winding", False, reason, _opening_warnings(report))
+
+
+def small_words(mesh: Mesh, voxel_size: Number, sign: str) -> tuple[str, ...]:
+    """What to tell of a mesh that is smaller than a voxel along an axis; nothing if it is not.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        At least one face.
+    voxel_size : float
+        World units.
+    sign : str
+        The method taken. Around unsigned faces a shell is kept, however thin the mesh is.
+    """
+    size = mesh.box.size
+    narrow = float(size.max() if sign == "unsigned" else size.min())
+    if narrow >= voxel_size:
+        return ()
+    sides = " x ".join(f"{side:.3g}" for side in size)
+    fix = [f"take voxels of {narrow / 4:.2g} or less"] if narrow > 0 else []
+    if sign == "unsigned":
+        becomes = "no more than a blob remains"
+    else:
+        becomes = "specks of it remain, or nothing"
+        fix.append("unsigned distances, which keep a shell")
+    where = "smaller than" if sign == "unsigned" else "in part thinner than"
+    return (
+        f"the mesh is {sides}, {where} a voxel of {voxel_size:.3g}: {becomes}; {', or '.join(fix)}",
+    )
+
+
+def _unsigned_words(report: TwoSetReport) -> str:
+    return f"{FLAT}; distances carry no sign" if report.flat else "distances carry no sign"
 
 
 def _crack_warnings(report: TwoSetReport) -> tuple[str, ...]:

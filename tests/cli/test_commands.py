@@ -56,6 +56,43 @@ def test_convert_writes_a_band_and_tells_its_facts(cli, tmp_path):
     assert (band.voxel_size, band.half_width) == (0.25, 2)
 
 
+def test_a_flat_mesh_gets_a_shell_and_is_told_so(cli, tmp_path):
+    mesh, out = tmp_path / "flat.ply", tmp_path / "flat.npz"
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]])
+    fan = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], np.int32)
+    write_mesh(mesh, Mesh(corners, fan))
+    outcome = cli("check", mesh)
+    assert "convert will write unsigned distances: all faces lie in one plane" in outcome.out
+    outcome = cli("convert", mesh, out, "--resolution", 16, "--json")
+    assert outcome.code == 0
+    assert outcome.json["sign"] == "unsigned"
+    (warning,) = outcome.json["warnings"]
+    assert warning.startswith("all faces lie in one plane: the mesh has no thickness")
+    surface = tmp_path / "shell.ply"
+    assert cli("mesh", out, surface).code == 0
+    box = read_mesh(surface).box  # a voxel around the square
+    assert box.size == pytest.approx([1 + 2 / 16, 1 + 2 / 16, 2 / 16], abs=0.01)
+    signed = cli("convert", mesh, out, "--sign", "winding", "--json", "--force").json
+    assert "unsigned distances, which keep a shell" in signed["warnings"][0]
+
+
+def test_a_mesh_smaller_than_a_voxel_is_told_with_the_size_to_take(cli, tmp_path):
+    plate, out = tmp_path / "plate.ply", tmp_path / "plate.npz"
+    write_mesh(plate, box_mesh((1.0, 1.0, 0.02)))
+
+    def warned(*options) -> list[str]:
+        return cli("convert", plate, out, *options, "--force", "--json").json["warnings"]
+
+    (words,) = warned("--resolution", 8)
+    assert words.startswith("the mesh is 1 x 1 x 0.02, in part thinner than a voxel of 0.125")
+    assert "take voxels of 0.005 or less" in words
+    assert warned("--resolution", 200) == []
+    assert "smaller than a voxel of 1e+03" in " ".join(
+        warned("--voxel-size", 1000, "--sign", "unsigned")
+    )
+    assert len(warned("--resolution", 8, "--sign", "unsigned")) == 1  # a shell, as asked
+
+
 def test_convert_without_a_size_takes_128_voxels(cli, tmp_path):
     facts = cli("convert", ball(tmp_path / "a.ply"), tmp_path / "a.npz", "--json").json
     assert facts["voxel_size"] == pytest.approx(2 / 128)
