@@ -1,7 +1,7 @@
 """The command ``meshsdf``: finds the subcommand, runs it, turns errors into exit codes.
 
 Exit codes: 0 done, the answer is yes; 1 done, the answer is no; 2 misuse; 3 the input cannot be
-used or would not fit in memory; 130 interrupted.
+used or would not fit in memory; 130 interrupted; 143 told to end (SIGTERM).
 """
 
 import gc
@@ -100,15 +100,21 @@ def main() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be any bytes
     gc.set_threshold(GARBAGE_AFTER)
     warnings.simplefilter("ignore", RuntimeWarning)  # overflow is judged where it matters
-    signal.signal(signal.SIGINT, _on_ctrl_c)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _on_ctrl_c)
     code = run(sys.argv[1:])
     if code == INTERRUPTED:
+        code = 128 + _ended_by[0] if _ended_by else code
         # At once: the interpreter's own way out forgets the code if an import was interrupted
         os._exit(code)
     sys.exit(code)
 
 
+_ended_by: list[int] = []  # the signals that came, in their order
+
+
 def _on_ctrl_c(number: int, frame: object) -> None:
+    _ended_by.append(number)
     CTRL_C.set()
     raise KeyboardInterrupt
 

@@ -149,23 +149,20 @@ def _project_file(console: Console, mesh: str, project: str | None) -> Path:
 
 def _create(console: Console, file: Path, mesh, resolution: float | None) -> None:
     """A new project with a layer of the mesh's own colours, or of grey, and one to paint on."""
-    from ..io.atomic import atomic_write
+    from ..io.atomic import atomic_path
     from ..texture.journal import Project
     from ..texture.operations import Operation
     from ..texture.source_kinds import mesh_params
 
-    with atomic_write(file) as temporary:
-        temporary.unlink()
-        with Project.create(
-            temporary, mesh, resolution=resolution, progress=console.progress
-        ) as made:
-            has_colors = mesh.vertex_colors is not None or bool(mesh.materials)
-            ground = {} if has_colors else {"color": list(GREY)}
-            made.apply(Operation("add-layer", {"name": "base", **ground}))
-            if has_colors:
-                number = made.texture.layers[-1].number
-                made.apply(Operation("mesh-colors", {"layer": number, **mesh_params(mesh)}))
-            made.apply(Operation("add-layer", {"name": "paint"}))
+    sizes = {"resolution": resolution, "progress": console.progress}
+    with atomic_path(file) as temporary, Project.create(temporary, mesh, **sizes) as made:
+        has_colors = mesh.vertex_colors is not None or bool(mesh.materials)
+        ground = {} if has_colors else {"color": list(GREY)}
+        made.apply(Operation("add-layer", {"name": "base", **ground}))
+        if has_colors:
+            number = made.texture.layers[-1].number
+            made.apply(Operation("mesh-colors", {"layer": number, **mesh_params(mesh)}))
+        made.apply(Operation("add-layer", {"name": "paint"}))
     console.say(f"{file}: a new project")
 
 

@@ -279,7 +279,7 @@ def _make(console: Console, mesh: str, out: str, operation: Callable, options: d
 @contextmanager
 def _project(console: Console, mesh, out: str, options: dict):
     """The project to fill: a new one that appears when all is done, or one that exists."""
-    from ..io.atomic import atomic_write, check_output
+    from ..io.atomic import atomic_path, check_output
     from ..texture.journal import Project
 
     if options["add"]:
@@ -289,8 +289,7 @@ def _project(console: Console, mesh, out: str, options: dict):
     if Path(out).suffix.lower() != ".mtex":
         raise click.UsageError(f"OUT is {out!r}; textures are kept in files that end in .mtex")
     check_output(out, options["force"])
-    with atomic_write(out, options["force"]) as temporary:
-        temporary.unlink()
+    with atomic_path(out, options["force"]) as temporary:
         sizes = {"resolution": options["resolution"], "texel": options["texel"]}
         with console.stage("octree"):
             project = Project.create(temporary, mesh, base=options["base"], **sizes)

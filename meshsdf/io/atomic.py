@@ -138,6 +138,40 @@ def atomic_folder(path: str | os.PathLike, force: bool = False) -> Iterator[Path
         shutil.rmtree(temporary, ignore_errors=True)
 
 
+@contextmanager
+def atomic_path(path: str | os.PathLike, force: bool = False) -> Iterator[Path]:
+    """Yield where to write a file that is moved to ``path`` when the block ends.
+
+    For writers that put files of their own beside theirs, as databases do: the place is in a new,
+    empty folder beside ``path``, which goes with all that is in it, however the block ends.
+
+    Parameters
+    ----------
+    path : path
+        The file to be written. A symbolic link is followed.
+    force : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    IoError
+        As `atomic_write`.
+    """
+    check_output(path, force)
+    target = _target(path)
+    where = f"output {path}"
+    folder = target.with_name(f".meshsdf-{secrets.token_hex(8)}")
+    try:
+        os.mkdir(folder)
+        yield folder / target.name
+        _flush(folder / target.name)
+        _place(folder / target.name, target, force, where)
+    except OSError as error:
+        raise _explained(error, target.parent, where) from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def write_text(path: str | os.PathLike, text: str, *, force: bool = False) -> None:
     """Write a text file (UTF-8) as `atomic_write` does; IoError as there."""
     with atomic_write(path, force) as temporary:

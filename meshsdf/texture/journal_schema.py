@@ -157,14 +157,22 @@ def copy_to(connection: sqlite3.Connection, path: Path) -> None:
     if path.exists():
         raise TextureError("there is such a file already", str(path), "choose another name")
     beside = path.with_name(f".{path.name}.new")
-    beside.unlink(missing_ok=True)
     try:
+        forget(beside)
         connection.execute("VACUUM INTO ?", (str(beside),))
         os.replace(beside, path)
     except (sqlite3.Error, OSError) as error:
-        beside.unlink(missing_ok=True)
         what = f"the copy cannot be written: {error}"
         raise TextureError(what, str(path), "check the folder and its free space") from None
+    finally:
+        forget(beside)
+
+
+def forget(path: Path) -> None:
+    """Remove a database that is not finished, with what SQLite keeps beside it, if it is there."""
+    for end in ("", "-journal", "-wal", "-shm"):
+        with contextlib.suppress(OSError):
+            Path(f"{path}{end}").unlink(missing_ok=True)
 
 
 def check_header(path: Path) -> None:

@@ -13,7 +13,7 @@ from ..errors import TextureError
 from ..mesh import Mesh
 from .blobs import Damaged, pack_all, unpack
 from .journal_log import KERNEL_VERSION
-from .journal_schema import FAULTS, create
+from .journal_schema import FAULTS, create, forget
 from .octree import Octree
 from .octree_store import octree_arrays, octree_of_arrays
 from .volume_texture import VolumeTexture
@@ -37,11 +37,11 @@ def write_new(path: Path, texture: VolumeTexture) -> None:
     Raises
     ------
     TextureError
-        It cannot be written; then nothing is left of it.
+        It cannot be written. However this ends, nothing half written is left.
     """
     beside = path.with_name(f".{path.name}.new")
     try:
-        beside.unlink(missing_ok=True)
+        forget(beside)
         with contextlib.closing(create(beside)) as connection:
             connection.execute("BEGIN")
             write_parts(connection, texture)
@@ -49,9 +49,10 @@ def write_new(path: Path, texture: VolumeTexture) -> None:
             connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         os.replace(beside, path)
     except (sqlite3.Error, OSError) as error:
-        beside.unlink(missing_ok=True)
         what = f"the project cannot be written: {error}"
         raise TextureError(what, str(path), "check the folder and its free space") from None
+    finally:
+        forget(beside)
 
 
 def write_parts(connection: sqlite3.Connection, texture: VolumeTexture, origin: int = 0) -> None:

@@ -73,3 +73,50 @@ def test_an_interrupt_that_python_dropped_is_raised_at_the_next_progress(monkeyp
     pressed.set()
     with pytest.raises(KeyboardInterrupt):
         object.__new__(Console).progress("edges", 1.0)  # one made whole needs a running command
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are sent otherwise there")
+@pytest.mark.parametrize(
+    ("number", "seen", "delay"),
+    [
+        (signal.SIGINT, "", 0.0),
+        (signal.SIGINT, ".new", 0.0),
+        (signal.SIGINT, "-wal", 0.3),
+        (signal.SIGTERM, "-lock", 0.0),
+        (signal.SIGTERM, "-wal", 0.1),
+    ],
+)
+def test_a_texture_that_is_stopped_leaves_nothing(tmp_path, number, seen, delay):
+    small, out = ball(tmp_path / "ball.ply", subdivisions=4), tmp_path / "a.mtex"
+    command = [sys.executable, "-m", "meshsdf", "texture", "procedural", str(small), str(out)]
+    command += ["--kind", "wood_grain", "--resolution", "800", "--level", "0"]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    while not any(name.endswith(seen) and name != small.name for name in names_below(tmp_path)):
+        assert running.poll() is None, "it ended before it was stopped"
+        time.sleep(0.002)
+    time.sleep(delay)
+    running.send_signal(number)
+    printed, words = (text.decode() for text in running.communicate(timeout=120))
+    assert running.returncode == 128 + number, words
+    assert printed == ""
+    assert words.splitlines()[-1] == "interrupted; nothing is left half written"
+    assert os.listdir(tmp_path) == ["ball.ply"]
+
+
+def names_below(folder) -> list[str]:
+    """Files and folders, however fast they come and go."""
+    return [name for _, folders, files in os.walk(folder) for name in folders + files]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process at once there")
+@pytest.mark.parametrize("name", ["a.npz", "a.zarr"])
+def test_sigterm_leaves_the_old_file_and_nothing_else(mesh, tmp_path, name):
+    out = tmp_path / name
+    command = [sys.executable, "-m", "meshsdf", "convert", str(mesh), str(out), *LONG]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    wait_until_it_reads(running, mesh)
+    running.send_signal(signal.SIGTERM)
+    _, words = (text.decode() for text in running.communicate(timeout=60))
+    assert running.returncode == 143, words
+    assert "nothing is left half written" in words
+    assert os.listdir(tmp_path) == []

@@ -1,5 +1,6 @@
 """meshsdf.io.atomic: the old file, or the new one, and never anything between."""
 
+import contextlib
 import errno
 import os
 import stat
@@ -7,7 +8,7 @@ import stat
 import pytest
 
 from meshsdf.errors import IoError
-from meshsdf.io.atomic import atomic_write, check_output, make_folder, write_text
+from meshsdf.io.atomic import atomic_path, atomic_write, check_output, make_folder, write_text
 
 
 def names(folder):
@@ -184,3 +185,22 @@ def test_a_suffix_that_does_not_suit_is_refused_before_any_work(tmp_path):
         check_output(tmp_path / "a.obj", kind="volume")
     with pytest.raises(IoError, match=r"a mesh with suffix '\.gltf' cannot be written"):
         check_output(tmp_path / "a.gltf", kind="mesh")
+
+
+@pytest.mark.parametrize("stop", [None, KeyboardInterrupt])
+def test_what_a_writer_puts_beside_its_file_goes_with_the_block(tmp_path, stop):
+    (tmp_path / "a.db").write_bytes(b"old")
+    with (
+        contextlib.suppress(KeyboardInterrupt),
+        atomic_path(tmp_path / "a.db", force=True) as place,
+    ):
+        assert place.name == "a.db"
+        place.write_bytes(b"new")
+        place.with_name("a.db-wal").write_bytes(b"log")
+        place.with_name("a.db.d").mkdir()
+        if stop is not None:
+            raise stop
+    assert (tmp_path / "a.db").read_bytes() == (b"new" if stop is None else b"old")
+    assert names(tmp_path) == ["a.db"]
+    with pytest.raises(IoError, match="the output exists"), atomic_path(tmp_path / "a.db"):
+        pass

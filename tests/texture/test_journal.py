@@ -318,3 +318,14 @@ def test_parameters_of_operations_come_back_as_they_were():
                  (found["inside"]["u"], params["inside"]["u"])]:  # fmt: skip
         assert a.dtype == b.dtype
         np.testing.assert_array_equal(a, b)
+
+
+def test_a_project_that_is_stopped_while_it_is_written_leaves_nothing(tmp_path, monkeypatch):
+    def stopped(connection, texture):
+        connection.execute("CREATE TABLE half (n INTEGER)")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("meshsdf.texture.project_parts.write_parts", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        fresh(tmp_path)
+    assert os.listdir(tmp_path) == []
