@@ -244,6 +244,7 @@ class Studio:
                 subscriber.refill()
         except MeshsdfError as error:
             self.project.warn(f"pages could not be told what changed: {error.what}")
+        self.project.keep_house()
         if not self.is_busy:
             self.project.history.put_some_by()
 

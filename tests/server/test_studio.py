@@ -11,7 +11,7 @@ from meshsdf.mesh import icosphere
 from meshsdf.server import studio as studio_module
 from meshsdf.server.feed import Feed
 from meshsdf.server.studio import Studio
-from meshsdf.texture import Brush, Operation, Project
+from meshsdf.texture import Brush, Operation, Project, housekeeping
 from meshsdf.texture.live import LiveStrokes
 
 UP = np.array([[0.0, 0.0, 1.0]])
@@ -83,6 +83,22 @@ def test_samples_are_taken_in_while_the_studio_is_busy_and_are_painted_by_whatev
         await studio.close()
 
     asyncio.run(main())
+
+
+def test_the_log_does_not_grow_with_a_stroke_that_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(housekeeping, "COPY_SECONDS", 0.0)
+
+    async def main():
+        studio = studio_of(tmp_path)
+        await studio.do(studio.live.begin, "a", 1, 0, Brush(0.2))
+        for number in range(300):
+            await (await studio.ask_intake(studio.live.keep, "a", 2 + number, UP, UP))
+        size = (tmp_path / "a.mtex-wal").stat().st_size
+        await studio.close()
+        return size
+
+    page = 4096
+    assert asyncio.run(main()) < 150 * page  # of 300 at least that were written
 
 
 def test_samples_wait_when_too_many_are_not_painted_yet(tmp_path, monkeypatch):
