@@ -128,11 +128,17 @@ def test_relief_changes_the_light_where_it_was_painted_and_undo_takes_it_back(pa
 
 
 def test_a_bump_stands_out_at_the_rim_and_is_there_after_a_reload(painted, ball):
-    sculpt(painted, (-20, 0), (20, 0), amount=8, radius=0.3)
+    sculpt(painted, (-20, 0), (20, 0), amount=5, radius=0.35, hardness=0)
     views = [look_from_the_side(painted, show="normal", relief=one) for one in (False, True)]
     flat, raised = (one[..., 3] == 255 for one in views)
     assert (flat & ~raised).sum() == 0
     assert 100 < (raised & ~flat).sum() < 0.2 * flat.sum()
+    # What a pixel shows of the moved surface is what lies under it for a pointer
+    points, normals, drawn = looked_at(painted, "displacement")
+    wanted = on_the_map(heights_at(ball, points, normals), painted.store()["reach"])
+    off = np.abs(drawn - wanted).max(axis=1)
+    assert (np.abs(wanted - 255 * EVEN).max(axis=1) > 40).sum() > 100
+    assert np.quantile(off, 0.95) < 6
     before = look_from_the_side(painted, show="color", relief=True)
     painted.page.reload()
     painted.settle()
@@ -147,6 +153,12 @@ def look_from_the_side(painted: Painted, **view) -> np.ndarray:
     painted.settle()
     painted.ask("meshsdf.viewer.pixels()")
     return painted.drawn()
+
+
+def looked_at(painted: Painted, display: str):
+    painted.ask("meshsdf.viewer.resetView()")
+    show(painted, show=display, relief=True, lit=False)
+    return painted.look()
 
 
 def test_the_eraser_and_keys_work_on_heights_and_colours_are_put_away(painted, ball):
@@ -186,3 +198,28 @@ def test_heights_everywhere_find_room_on_the_card(browser, tmp_path):
         come_near(painted)
         heights = check_map(painted, server)
         assert np.ptp(heights) > 1
+
+
+def test_painted_normals_are_shown_as_far_as_they_cover_the_surface(painted, ball):
+    come_near(painted)
+    painted.set("tool", **PEN | {"channel": "normal", "color": [0.0, 0.6, 0.8], "hardness": 0.6})
+    painted.drag((-50, 0), (50, -20))
+    painted.page.mouse.move(2, 2)
+    painted.settle()
+    show(painted, show="normal")
+    points, normals, drawn = painted.look()
+    texture, origin = ball.studio.texture, ball.studio.origin
+    found = texture.colors(points + origin, normals, channel="normal").astype(np.float64)
+    center = np.asarray(texture.surface.vertices).mean(axis=0) - origin
+    own = unit(points - center)
+    share = found[:, 3:]
+    assert (share > 0.99).sum() > 100
+    wanted = unit((1 - share) * own + share * unit(found[:, :3]))
+    # Eight bits on the wire, and a ball of some thousand faces
+    assert np.abs(drawn - 127.5 * (1 + wanted)).max() < 5
+
+
+def unit(vectors):
+    """Vectors of length 1; 0 where there is none."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(length > 0, vectors / np.maximum(length, 1e-30), 0.0)

@@ -126,8 +126,9 @@ export class Model {
     const hit = this.surface.hit(ray);
     if (!hit || !this.isRaised || this.painting.reach === 0) return hit;
     const { texel } = this.octree;
+    const { reach } = this.painting;
     const heights = this.held ?? this.painting.heightBricks;
-    return onRelief(this.surface, ray, hit, (at) => this.heightAt(at, heights) * texel, texel);
+    return onRelief(this.surface, ray, hit, (at) => this.heightAt(at, heights) * texel, reach * texel);
   }
 
   /**

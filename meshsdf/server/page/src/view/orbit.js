@@ -34,6 +34,7 @@ export class Orbit {
   constructor(center, radius) {
     this.center = center.clone();
     this.radius = radius;
+    this.spread = 0; // how far things may lie beyond that
     this.camera = new PerspectiveCamera(FOV, 1, 0.1, 100);
     this.width = this.height = 1;
     this.caster = new Raycaster();
@@ -57,6 +58,16 @@ export class Orbit {
     if (this.isFresh) {
       this.goal.distance = this.pose.distance = this.#wholeDistance();
     }
+    this.#place();
+  }
+
+  /**
+   * What is looked at has grown, or shrunk: nothing of it may be cut off in front of the camera.
+   *
+   * @param {number} spread how far it may lie beyond its radius
+   */
+  grow(spread) {
+    this.spread = spread;
     this.#place();
   }
 
@@ -213,8 +224,9 @@ export class Orbit {
     this.camera.position.copy(target).add(away);
     this.camera.lookAt(target);
     const center = this.camera.position.distanceTo(this.center);
-    this.camera.far = center + 1.1 * this.radius;
-    this.camera.near = Math.max(center - 1.1 * this.radius, distance * 0.01, this.camera.far * 1e-5);
+    const most = 1.1 * this.radius + this.spread;
+    this.camera.far = center + most;
+    this.camera.near = Math.max(center - most, distance * 0.01, this.camera.far * 1e-5);
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();
     this.#matrix.multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);

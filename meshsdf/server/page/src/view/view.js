@@ -94,8 +94,8 @@ export class View {
     for (const [bricks, picture] of this.early.splice(0)) model.painting.take(bricks, picture);
     this.model = model;
     this.scene.add(model.object);
-    this.#tellReach();
     this.orbit = new Orbit(model.surface.center, model.surface.radius);
+    this.#tellReach();
     this.gestures = new Gestures({
       canvas: this.canvas,
       store: this.store,
@@ -144,7 +144,9 @@ export class View {
 
   /** Another largest height has other colours, and another legend. */
   #tellReach() {
-    this.store.set({ reach: this.model?.painting.reach ?? 0 });
+    const reach = this.model?.painting.reach ?? 0;
+    this.orbit?.grow(reach * (this.model?.octree.texel ?? 0));
+    this.store.set({ reach });
     if (this.store.get().view.show === "displacement") this.region.addAll();
   }
 
