@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import click
@@ -101,6 +101,15 @@ class Console:
             raise KeyboardInterrupt
         self._count(stage)
         self._show(stage, fraction)
+
+    def within(self, name: str) -> Callable[[str, float], None]:
+        """A callback that shows what it is told, as `progress`, and counts the time as ``name``."""
+
+        def shown(stage: str, fraction: float) -> None:
+            self.progress(name, fraction)
+            self._show(stage, fraction)
+
+        return shown
 
     def close(self) -> None:
         """Take the bar away, or see that none appears any more."""

@@ -262,7 +262,8 @@ def _make(console: Console, mesh: str, out: str, operation: Callable, options: d
             project.apply(Operation("add-layer", {"name": name}))
             number = project.texture.layers[-1].number
             kind, params = operation(project.texture, loaded)
-            project.apply(Operation(kind, {"layer": number, "level": options["level"], **params}))
+            params = {"layer": number, "level": options["level"], **params}
+            project.apply(Operation(kind, params), progress=console.within("fill"))
         with console.stage("write"):
             project.checkpoint()
         facts = texture_facts(project)

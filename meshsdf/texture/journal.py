@@ -209,7 +209,10 @@ class Project:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def apply(self, operation: Operation, *, client: str = "", cseq: int | None = None) -> int:
+    def apply(
+        self, operation: Operation, *, client: str = "", cseq: int | None = None,
+        progress: Progress = silent,
+    ) -> int:  # fmt: skip
         """Do an operation, keep it, and return its number once it is on the disk.
 
         Parameters
@@ -231,9 +234,11 @@ class Project:
         if self._is_painting:
             what = "strokes are being painted"
             raise TextureError(what, "Project.apply", "go through LiveStrokes.apply")
-        return self.apply_under(operation, client=client, cseq=cseq)
+        return self.apply_under(operation, client=client, cseq=cseq, progress=progress)
 
-    def apply_under(self, operation: Operation, *, client: str, cseq: int | None) -> int:
+    def apply_under(
+        self, operation: Operation, *, client: str, cseq: int | None, progress: Progress = silent
+    ) -> int:
         """As `apply`, by whoever sees to the strokes that are being painted."""
         operation = Operation.decoded(operation.kind, operation.encoded())
         seq = self.last_seq + 1
@@ -241,7 +246,7 @@ class Project:
             self._turn(operation, op_row(seq, client, cseq, operation, True))
         else:
             with recording(self.texture) as change:
-                perform(self.texture, operation)
+                perform(self.texture, operation, progress=progress)
             row = op_row(seq, client, cseq, operation, not change.is_empty)
             self._commit(row, lambda: change.undo(self.texture))
             self._push(operation, seq, change)

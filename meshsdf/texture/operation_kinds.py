@@ -7,13 +7,13 @@ import numpy as np
 from ..arrays import Number
 from ..errors import TextureError
 from ..kernels.texture_lookup import ABSENT
-from ..sdf.mesh_distance import MeshDistance
+from ..progress import Progress, silent
 from .ball import paint_ball_on
 from .detail import Level, bake_level
 from .layer import Layer
 from .procedural import procedural, sees_shape
 from .refine import coarsen
-from .sdf_patterns import SignedDistance
+from .shape_distance import ShapeDistance
 from .volume_texture import Color, VolumeTexture
 
 
@@ -86,7 +86,13 @@ def fill_color(texture: VolumeTexture, *, layer: int, color: Color) -> None:
 
 
 def bake(
-    texture: VolumeTexture, *, layer: int, texture_kind: str, level: Level = 0, **parameters: Any
+    texture: VolumeTexture,
+    *,
+    layer: int,
+    texture_kind: str,
+    level: Level = 0,
+    progress: Progress = silent,
+    **parameters: Any,
 ) -> None:
     """Make a layer's colour a procedural texture, see `detail.bake_level`.
 
@@ -98,12 +104,12 @@ def bake(
         There is no such layer, level or texture, or it has other parameters.
     """
     found = layer_numbered(texture, layer)
-    distance = surface_distance(texture) if sees_shape(texture_kind) else None
+    distance = surface_distance(texture, progress) if sees_shape(texture_kind) else None
     solid = procedural(texture_kind, signed_distance=distance, **parameters)
-    bake_level(texture, found, solid, level=level)
+    bake_level(texture, found, solid, level=level, progress=progress)
 
 
-def surface_distance(texture: VolumeTexture) -> SignedDistance:
+def surface_distance(texture: VolumeTexture, progress: Progress = silent) -> ShapeDistance:
     """The signed distance of the surface that a texture was made around.
 
     Raises
@@ -114,8 +120,7 @@ def surface_distance(texture: VolumeTexture) -> SignedDistance:
     if texture.surface is None:
         what = "the texture does not know its surface"
         raise TextureError(what, "operation 'bake'", "set texture.surface to the mesh")
-    distances = MeshDistance(texture.surface)
-    return lambda points: distances(points).distance
+    return ShapeDistance(texture.surface, progress=progress)
 
 
 def paint_ball(

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TextureError
+from ..progress import Progress, silent
 from . import operation_kinds, source_kinds
 from .volume_texture import VolumeTexture
 
@@ -89,8 +90,8 @@ class Operation:
         return cls(kind, _restored(plain, memoryview(whole)[4 + n_head :]))
 
 
-def perform(texture: VolumeTexture, operation: Operation) -> None:
-    """Carry an operation out.
+def perform(texture: VolumeTexture, operation: Operation, *, progress: Progress = silent) -> None:
+    """Carry an operation out; kinds that fill a layer tell how far they are.
 
     Raises
     ------
@@ -101,14 +102,16 @@ def perform(texture: VolumeTexture, operation: Operation) -> None:
     if function is None:
         what = f"there is no operation {operation.kind!r}"
         raise TextureError(what, "perform(texture, operation)", f"use one of {', '.join(KINDS)}")
+    known = inspect.signature(function).parameters
+    told = {"progress": progress} if "progress" in known else {}
     try:
-        inspect.signature(function).bind(texture, **operation.params)
+        inspect.signature(function).bind(texture, **told, **operation.params)
     except TypeError as error:
-        names = [name for name in inspect.signature(function).parameters if name != "texture"]
+        names = [name for name in known if name not in ("texture", "progress")]
         what = f"operation {operation.kind!r}: {error}"
         fix = f"its parameters are {', '.join(names)}"
         raise TextureError(what, "Operation(params=...)", fix) from None
-    function(texture, **operation.params)
+    function(texture, **told, **operation.params)
 
 
 def _plain(value: Any, kind: str, arrays: list[bytes]) -> Any:

@@ -1,16 +1,18 @@
 """Textures that see the shape they are on: worn edges, dirt in cavities, thin parts.
 
 `procedural.procedural` makes them by name, too. They need no baked maps, as everything is asked of
-a signed distance ``f(points) -> values``, negative inside: an `Implicit`, an interpolated grid, or
+a signed distance ``f(points) -> values``, negative inside: a `ShapeDistance`, an `Implicit`, or
 ``lambda points: MeshDistance(mesh)(points).distance`` with the object made once. Curvature is right
 for any function with that zero set; occlusion and thickness want distances, or bounds of them.
+
+A `ShapeDistance` is sampled where the footprint is one number: distances are then read from voxels
+that are a small share of the length the texture measures over (`PER_VOXEL`). Beside textures of
+exact distances the weights are off by about 0.003 on average; the classes say what the most is.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -18,13 +20,16 @@ from ..arrays import Number, Points, Values
 from ..errors import TextureError
 from .colors import Color, StraightRgba, blend, premultiplied, straight
 from .parameters import check_parameters, means
+from .shape_distance import ShapeDistance, SignedDistance, values_of
+from .thickness import project, thickness
 from .waves import smoothstep
 
-SignedDistance = Callable[[Points], Any]
-
 TAPS = 5  # along the normal
-MOST_STEPS = 256  # of sphere tracing: each halves the way left, or crosses the shape
-CLOSE = 1e-9  # of the largest thickness: near enough to the far side
+NORMAL_STEP = 1 / 20  # of the reach: over which the normal is measured
+PER_VOXEL = {"edge_wear": 8, "cavity_dirt": 20, "thickness": 48}
+"""Voxels along the length over which a texture measures, where distances are sampled."""
+
+OFF_SURFACE = 2.0  # footprints: no texel is further from the surface
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +46,19 @@ class _OnShape(ABC):
         widths = np.broadcast_to(np.asarray(footprint, np.float64), len(points))
         first, second = self._color_pair()
         return straight(blend(first, second, self.weight(points, widths)))
+
+    def _seen(
+        self, kind: str, length: Number | Values, farthest: Number, footprint
+    ) -> SignedDistance:
+        """The distance to ask: sampled, if it is that of a mesh and all points are alike.
+
+        ``farthest`` is how far from a point on the surface is asked, in lengths.
+        """
+        lengths, widths = np.unique(length), np.unique(footprint)
+        if not (isinstance(self.distance, ShapeDistance) and len(lengths) == len(widths) == 1):
+            return self.distance
+        reach = farthest * lengths[0] + OFF_SURFACE * widths[0]
+        return self.distance.sampled(voxel_size=lengths[0] / PER_VOXEL[kind], reach=reach)
 
     @abstractmethod
     def weight(self, points: Points, footprint: Number | Values = 0.0) -> Values:
@@ -71,7 +89,8 @@ class EdgeWear(_OnShape):
     def weight(self, points: Points, footprint: Number | Values = 0.0) -> Values:
         """Return how much is worn off, (n,) in [0, 1]."""
         step = np.maximum(self.reach, np.asarray(footprint, np.float64) / 2)
-        kappa = mean_curvature(self.distance, points, step)
+        distance = self._seen("edge_wear", step, np.sqrt(2), footprint)
+        kappa = mean_curvature(distance, points, step)
         return smoothstep(0, 2 * self.threshold, kappa * step)
 
     def _color_pair(self) -> tuple[np.ndarray, np.ndarray]:
@@ -92,7 +111,8 @@ class CavityDirt(_OnShape):
     def weight(self, points: Points, footprint: Number | Values = 0.0) -> Values:
         """Return how dirty it is, (n,) in [0, 1]."""
         reach = np.maximum(self.reach, np.asarray(footprint, np.float64))
-        return np.minimum(self.strength * occlusion(self.distance, points, reach), 1.0)
+        distance = self._seen("cavity_dirt", reach, 1.0, footprint)
+        return np.minimum(self.strength * occlusion(distance, points, reach), 1.0)
 
     def _color_pair(self) -> tuple[np.ndarray, np.ndarray]:
         return premultiplied(self.clean), premultiplied(self.dirt)
@@ -122,7 +142,8 @@ class Thickness(_OnShape):
 
     def weight(self, points: Points, footprint: Number | Values = 0.0) -> Values:
         """Return 0 in thin parts, 1 in thick ones, (n,)."""
-        length = thickness(self.distance, points, largest=self.thick_length)
+        distance = self._seen("thickness", self.thick_length, 0.5, footprint)
+        length = thickness(distance, points, largest=self.thick_length)
         return smoothstep(self.thin_length, self.thick_length, length)
 
     def _color_pair(self) -> tuple[np.ndarray, np.ndarray]:
@@ -173,7 +194,7 @@ def mean_curvature(
     pairs = list(combinations(range(3), 2))
     diagonals = [eye[i] + side * eye[j] for i, j in pairs for side in (1, -1)]
     offsets = np.concatenate([np.zeros((1, 3)), eye, -eye, diagonals, -np.array(diagonals)])
-    values = _values(distance, (points + offsets[:, None] * step[:, None]).reshape(-1, 3))
+    values = values_of(distance, (points + offsets[:, None] * step[:, None]).reshape(-1, 3))
     values = values.reshape(len(offsets), -1)
     middle, after, before = values[0], values[1:4], values[4:7]
     gradient = (after - before) / (2 * step)
@@ -207,74 +228,11 @@ def occlusion(distance: SignedDistance, points: Points, reach: Number | Values) 
     array([0.])
     """
     reach = np.broadcast_to(np.asarray(reach, np.float64), len(points))
-    on_surface, normal = _project(distance, points, reach)
+    on_surface, normal = project(distance, points, NORMAL_STEP * reach)
     total = np.zeros(len(points))
     weights = 0.5 ** np.arange(TAPS)
     for tap, weight in enumerate(weights / weights.sum(), start=1):
         height = reach * tap / TAPS
-        found = _values(distance, on_surface + height[:, None] * normal)
+        found = values_of(distance, on_surface + height[:, None] * normal)
         total += weight * np.clip(1 - found / height, 0, 1)
     return total
-
-
-def thickness(distance: SignedDistance, points: Points, *, largest: Number) -> Values:
-    """Return the way through the shape along the inward normal, at most ``largest``.
-
-    Parameters
-    ----------
-    distance : callable
-        Its size never exceeds the distance to the surface; (n, 3) points to (n,) values.
-    points : (n, 3) float64
-        World units; on the surface or near it.
-    largest : float
-        World units; ways longer than it are not followed.
-
-    Notes
-    -----
-    Method: sphere tracing (Hart 1996, doi:10.1007/s003710050084) from 1e-4 of ``largest`` below
-    the surface, until the far side is within 1e-9 of it.
-
-    Examples
-    --------
-    >>> ball = lambda p: np.linalg.norm(p, axis=1) - 2.0
-    >>> thickness(ball, np.array([[2.0, 0.0, 0.0]]), largest=10.0).round(6)
-    array([4.])
-    """
-    largest = float(largest)
-    if not (np.isfinite(largest) and largest > 0):
-        raise TextureError(
-            f"largest is {largest}", "thickness(largest=...)", "pass a length above 0"
-        )
-    on_surface, normal = _project(distance, points, np.full(len(points), 1e-3 * largest))
-    way = np.full(len(points), 1e-4 * largest)
-    active = np.arange(len(points))
-    for _ in range(MOST_STEPS):
-        inside = -_values(distance, on_surface[active] - way[active, None] * normal[active])
-        way[active] += np.maximum(inside, 0)
-        active = active[(inside > CLOSE * largest) & (way[active] < largest)]
-        if not len(active):
-            break
-    return np.minimum(way, largest)
-
-
-def _project(distance: SignedDistance, points: Points, reach: Values) -> tuple[Points, Points]:
-    """The points moved onto the surface along the normal, and the unit normals there."""
-    step = 1e-3 * reach
-    offsets = np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    values = _values(distance, (points + offsets[:, None] * step[:, None]).reshape(-1, 3))
-    values = values.reshape(7, -1)
-    gradient = ((values[1:4] - values[4:7]) / (2 * step)).T
-    length = np.sqrt((gradient**2).sum(axis=1))
-    normal = gradient / np.where(length == 0, 1.0, length)[:, None]
-    return points - values[0][:, None] * normal, normal
-
-
-def _values(distance: SignedDistance, points: Points) -> Values:
-    values = np.asarray(distance(points), np.float64)
-    if values.shape != (len(points),):
-        raise TextureError(
-            f"the signed distance gave an array of shape {values.shape} for {len(points)} points",
-            "distance(points)",
-            "return (n,) values",
-        )
-    return values

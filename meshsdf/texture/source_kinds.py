@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import TextureError
 from ..mesh import Material, Mesh
+from ..progress import Progress, silent
 from ..spatial.image import Image
 from .camera_projection import CameraProjection
 from .detail import Level, bake_level
@@ -46,7 +47,14 @@ def mesh_params(mesh: Mesh) -> dict[str, Any]:
     return params
 
 
-def mesh_colors(texture: VolumeTexture, *, layer: int, level: Level = 0, **mesh: Any) -> None:
+def mesh_colors(
+    texture: VolumeTexture,
+    *,
+    layer: int,
+    level: Level = 0,
+    progress: Progress = silent,
+    **mesh: Any,
+) -> None:
     """Fill a layer with the colours that a mesh has at the closest places; see `mesh_params`.
 
     ``level`` is as `detail.bake_level` takes it.
@@ -58,7 +66,7 @@ def mesh_colors(texture: VolumeTexture, *, layer: int, level: Level = 0, **mesh:
         for one in mesh.pop("materials")
     )
     source = MeshSource(Mesh(**mesh, materials=materials))
-    bake_level(texture, layer_numbered(texture, layer), source, level=level)
+    bake_level(texture, layer_numbered(texture, layer), source, level=level, progress=progress)
 
 
 def project_image(
@@ -69,6 +77,7 @@ def project_image(
     projection: str,
     level: Level = 0,
     matrix: np.ndarray | None = None,
+    progress: Progress = silent,
     **options: Any,
 ) -> None:
     """Fill a layer with an image projected onto the surface; nothing where it does not reach.
@@ -86,7 +95,7 @@ def project_image(
 
     found = layer_numbered(texture, layer)
     made = make_projection(texture, image, projection, matrix, **options)
-    bake_level(texture, found, made, level=level)
+    bake_level(texture, found, made, level=level, progress=progress)
 
 
 def make_projection(

@@ -263,7 +263,7 @@ def test_replay_by_other_kernels_is_told(tmp_path, monkeypatch):
     project.apply(Operation("add-layer"))
     project._connection.close()
     project._lock.release()
-    monkeypatch.setattr(journal, "KERNEL_VERSION", 3)
+    monkeypatch.setattr(journal, "KERNEL_VERSION", journal.KERNEL_VERSION + 1)
     words = []
     Project.open(tmp_path / "a.mtex", warn=words.append).close()
     assert "another version of meshsdf" in words[0]
