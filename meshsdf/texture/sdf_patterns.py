@@ -6,8 +6,9 @@ a signed distance ``f(points) -> values``, negative inside: a `ShapeDistance`, a
 for any function with that zero set; occlusion and thickness want distances, or bounds of them.
 
 A `ShapeDistance` is sampled where the footprint is one number: distances are then read from voxels
-that are a small share of the length the texture measures over (`PER_VOXEL`). Beside textures of
-exact distances the weights are off by about 0.003 on average; the classes say what the most is.
+that are a small share of the length the texture measures over (`PER_VOXEL`). The weights differ
+from those of exact distances by 0.008 on average, by 0.08 at one of a hundred places (suzanne, spot
+and armadillo, lengths as `procedural.lengths_for` has them; most at creases).
 """
 
 from abc import ABC, abstractmethod
@@ -25,8 +26,8 @@ from .thickness import project, thickness
 from .waves import smoothstep
 
 TAPS = 5  # along the normal
-NORMAL_STEP = 1 / 20  # of the reach: over which the normal is measured
-PER_VOXEL = {"edge_wear": 8, "cavity_dirt": 20, "thickness": 48}
+NORMAL_STEP = 1 / 10  # of the reach: over which the normal is measured
+PER_VOXEL = {"edge_wear": 8, "cavity_dirt": 20, "thickness": 64}
 """Voxels along the length over which a texture measures, where distances are sampled."""
 
 OFF_SURFACE = 2.0  # footprints: no texel is further from the surface

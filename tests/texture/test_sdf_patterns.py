@@ -58,8 +58,8 @@ def test_the_error_of_the_curvature_falls_with_the_square_of_the_step():
 
 
 def test_open_places_are_not_occluded_and_a_corner_is_by_its_formula():
-    # Normals over 0.025 are off by at most 0.025^2 / 2 on this sphere, heights by its square
-    assert_allclose(occlusion(sphere(1.0), on_sphere(1.0), 0.5), 0, atol=1e-7)
+    # Normals over 0.05 are off by at most 0.05^2 / 8 on this sphere, distances by its square
+    assert_allclose(occlusion(sphere(1.0), on_sphere(1.0), 0.5), 0, atol=5e-7)
     # A floor z = 0 beside a wall x = 0: a tap at height t is min(t, x) from the shape
     away = np.array([0.05, 0.15, 0.25, 0.6])
     points = np.stack([away, 0 * away, 0 * away], axis=1)
@@ -77,14 +77,14 @@ def test_a_slab_is_as_thick_as_it_is_and_a_ball_as_its_diameter():
     points = np.random.default_rng(2).uniform(-1, 1, (100, 3))
     points[:, 2] = np.where(points[:, 2] > 0, 0.15, -0.15)
     assert_allclose(thickness(slab, points, largest=2.0), 0.3, atol=1e-8)
-    # Normals are measured over s, a 64th of the largest: they are off by (s / r)^2 / 8 at
+    # Normals are measured over s, a 24th of the largest: they are off by (s / r)^2 / 8 at
     # most, and the line passes the middle of the ball by as much, in radii; half as much for dives
-    bound = 2 * 0.7 * (2.0 / 64 / 0.7) ** 2 * 1.5 / 8
+    bound = 2 * 0.7 * (2.0 / 24 / 0.7) ** 2 * 1.5 / 8
     found = thickness(sphere(0.7), on_sphere(0.7), largest=2.0)
     assert_allclose(found, 1.4, atol=bound)
     assert found.max() <= 1.4 + 1e-12
     # Longer ways end at the largest; points a little off the surface see the same
-    assert_allclose(thickness(sphere(0.7), on_sphere(0.7), largest=1.0), 1.0)
+    assert_allclose(thickness(sphere(0.7), on_sphere(0.7), largest=1.0), 1.0, atol=1e-5)
     assert_allclose(thickness(sphere(0.7), on_sphere(0.71), largest=2.0), 1.4, atol=bound)
 
 

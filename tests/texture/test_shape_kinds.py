@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 from meshsdf.errors import TextureError
 from meshsdf.mesh import box_mesh
+from meshsdf.texture.journal import Project
 from meshsdf.texture.operations import Operation, perform
 from meshsdf.texture.procedural import lengths_for, parameters_of, procedural, sees_shape
 from meshsdf.texture.sdf_patterns import ON_SHAPE, EdgeWear, Thickness
@@ -68,3 +69,29 @@ def test_as_an_operation_the_surface_of_the_texture_is_the_shape():
     assert_allclose(on_side[:3], 0.5, atol=2 / 255)  # 0.2 thick: halfway
     on_rim = texture.colors(np.array([[0.5, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]]))[0]
     assert_allclose(on_rim[:3], 0.5, atol=2 / 255)  # the ball that fits there has the same size
+
+
+def test_filling_a_layer_tells_how_far_it_is_and_can_be_stopped(tmp_path):
+    texture = VolumeTexture.around(box_mesh(), resolution=128)
+    texture.add_layer()
+    params = {"layer": 0, "texture_kind": "cavity-dirt", "reach": 0.2}
+    told = []
+    perform(texture, Operation("bake", params), progress=lambda *one: told.append(one))
+    shares = [share for stage, share in told if stage == "bake"]
+    assert len(shares) > 1
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    assert any(stage != "bake" for stage, _ in told)  # the distances' own stages
+    with pytest.raises(TextureError, match="multiple values for keyword argument 'progress'"):
+        perform(texture, Operation("bake", params | {"progress": 1}))
+
+    def stop(stage: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    with Project.create(tmp_path / "a.mtex", box_mesh(), resolution=16) as project:
+        project.apply(Operation("add-layer"))
+        before = project.digest()
+        with pytest.raises(KeyboardInterrupt):
+            project.apply(Operation("bake", params), progress=stop)
+        assert project.last_seq == 1
+        assert project.digest() == before
