@@ -108,14 +108,19 @@ def export(
     """Write what TEXTURE (.mtex) shows on its own mesh."""
     console = Console("texture-export", as_json=as_json)
     console.watch_compilation()
-    from ..io.texture_files import Layout, check_texture_output, words_of, write_texture
+    from ..io.texture_files import (
+        Layout,
+        check_texture_outputs,
+        mesh_beside,
+        words_of,
+        write_texture,
+    )
     from ..texture.journal import Project
 
-    for out in outputs:
-        check_texture_output(out, force)
+    check_texture_outputs(outputs, force)
     with console.stage("load"):
         project = Project.open(texture, warn=console.warn)
-    written = []
+    written, with_mesh = [], set()
     with project:
         shown = project.texture
         mesh = shown.surface
@@ -124,7 +129,10 @@ def export(
         for out in outputs:
             with console.stage("export"):
                 options = {"layout": Layout(size, atlas, time_limit), "channel": channel}
+                options["with_mesh"] = mesh_beside(out) not in with_mesh
                 facts = write_texture(out, shown, mesh, **options, force=force, warn=console.warn)
+            if "mesh" in facts:
+                with_mesh.add(mesh_beside(out))
             n_bytes = Path(out).stat().st_size
             written.append({"output": out, "bytes": n_bytes} | facts)
             console.result(f"{out}: {words_of(facts)}, {file_size(n_bytes)}", is_last=False)

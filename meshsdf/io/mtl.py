@@ -19,6 +19,12 @@ def material_name(name: str) -> str:
     return " ".join(name.split()) or "none"
 
 
+def material_image(path: Path, name: str) -> Path:
+    """The file for the image of a material of an OBJ file: ``cow-hide.png`` of ``cow.obj``."""
+    plain = re.sub(r"[^\w.-]+", "_", material_name(name))
+    return path.with_name(f"{path.stem}-{plain}.png")
+
+
 def has_library(mesh: Mesh) -> bool:
     """Whether a mesh has images, for which an OBJ file needs a material file beside it."""
     return mesh.uv is not None and any(one.image is not None for one in mesh.materials)
@@ -40,10 +46,9 @@ def write_materials(path: Path, mesh: Mesh, force: bool) -> str:
         color = " ".join(repr(float(value)) for value in material.base_color[:3])
         lines += [f"newmtl {name}", f"Kd {color}", f"d {float(material.base_color[3])!r}"]
         if material.image is not None:
-            plain = re.sub(r"[^\w.-]+", "_", name)
-            file = path.with_name(f"{path.stem}-{plain}.png")
+            file = material_image(path, name)
             if file in images:
-                file = path.with_name(f"{path.stem}-{plain}-{number}.png")
+                file = file.with_name(f"{file.stem}-{number}.png")
             images[file] = encode_png(material.image)
             lines.append(f"map_Kd {file.name}")
     library = path.with_suffix(".mtl")

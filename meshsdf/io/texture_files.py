@@ -5,16 +5,19 @@ fits one layout of one mesh, which is written beside it.
 """
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ..arrays import Number
+from ..errors import IoError
 from ..mesh import Mesh
 from ..texture.atlas import Atlas, Method, atlas_colors, atlas_for, textured, vertex_colored
 from ..texture.volume_texture import VolumeTexture
 from .atomic import check_output
 from .meshes import write_mesh
+from .mtl import material_image
 from .pictures import write_picture
 from .vdb_texture import write_vdb_texture
 from .warn import Warn, ignore
@@ -48,8 +51,40 @@ def check_texture_output(path: str | os.PathLike, force: bool = False) -> None:
     """Refuse a place that `write_texture` could not write to; IoError as `check_output`."""
     suffix = Path(path).suffix.lower()
     check_output(path, force, kind=None if suffix in (*PICTURES, *VOLUMES) else "mesh")
+    for place in companions(path):
+        if place.exists() and not force:
+            what = f"{place.name}, which goes with {Path(path).name}, exists"
+            raise IoError(what, f"output {path}", "pass --force to replace it, or take other names")
+        check_output(place, force)
+
+
+def check_texture_outputs(paths: Sequence[str | os.PathLike], force: bool = False) -> None:
+    """Refuse what `write_texture` could not write, one after another; IoError as `check_output`.
+
+    Pictures of one stem share the mesh that goes with them; all other files must differ.
+    """
+    taken: dict[str, str] = {}
+    for path in paths:
+        check_texture_output(path, force)
+        shared = mesh_beside(path) if Path(path).suffix.lower() in PICTURES else None
+        for place in (Path(path), *companions(path)):
+            key = os.path.realpath(place)
+            owner = f"the mesh of {place.stem}" if place == shared else os.fspath(path)
+            if key in taken and not (place == shared and taken[key] == owner):
+                what = f"{place.name} would be written twice"
+                raise IoError(what, f"output {path}", "name each file once, with other stems")
+            taken[key] = owner
+
+
+def companions(path: str | os.PathLike) -> tuple[Path, ...]:
+    """The files that are written beside one, so that it can be used."""
+    path = Path(path)
+    suffix = path.suffix.lower()
     if suffix in PICTURES:
-        check_output(mesh_beside(path), force)
+        return (mesh_beside(path),)
+    if suffix == ".obj":
+        return path.with_suffix(".mtl"), material_image(path, path.stem)
+    return ()
 
 
 def colored_mesh(
@@ -94,6 +129,7 @@ def write_texture(
     *,
     layout: Layout = PLAIN,
     channel: str = "base",
+    with_mesh: bool = True,
     force: bool = False,
     warn: Warn = ignore,
 ) -> dict[str, Any]:
@@ -108,6 +144,8 @@ def write_texture(
         As for `colored_mesh`.
     channel : str
         Of an image alone.
+    with_mesh : bool
+        Whether the mesh goes beside an image alone; it is there already for one of the same stem.
     force : bool
         Whether existing files may be replaced.
 
@@ -124,8 +162,9 @@ def write_texture(
         laid = atlas_for(mesh, layout.size, layout.method, time_limit=float(layout.time_limit))
         write_picture(path, atlas_colors(texture, laid, channel=channel), force=force)
         bare = replace(laid.mesh, material_index=None, materials=(), vertex_colors=None)
-        write_mesh(mesh_beside(path), bare, force=force)
-        return _image_facts(laid, layout)
+        if with_mesh:
+            write_mesh(mesh_beside(path), bare, force=force)
+        return _image_facts(laid, layout) | {"mesh": mesh_beside(path).name}
     colored, facts = colored_mesh(texture, mesh, path, layout=layout, warn=warn)
     write_mesh(path, colored, force=force)
     return facts
@@ -152,7 +191,8 @@ def words_of(facts: dict[str, Any]) -> str:
         "squares": "a square for every two faces",
     }[facts["atlas"]]
     why = f" ({facts['without_xatlas']})" if facts.get("without_xatlas") else ""
-    return f"{words} of {facts['size']} x {facts['size']} pixels, {by}{why}"
+    mesh = f", on the mesh {facts['mesh']}" if facts.get("mesh") else ""
+    return f"{words} of {facts['size']} x {facts['size']} pixels, {by}{why}{mesh}"
 
 
 def _image_facts(laid: Atlas, layout: Layout) -> dict[str, Any]:

@@ -150,6 +150,28 @@ def test_everything_that_can_be_exported_is(cli, checkered, tmp_path):
     assert cli("texture", "export", out, *to, *options).code == 3
 
 
+def test_pictures_of_one_stem_share_their_mesh_and_name_it(cli, checkered, tmp_path):
+    out = tmp_path / "box.mtex"
+    assert cli("texture", "bake", checkered, out, "--resolution", 32).code == 0
+    export = ["texture", "export", out, "--atlas", "squares", "--size", 128]
+    outcome = cli(*export, "--to", tmp_path / "a.exr", "--to", tmp_path / "a.png")
+    assert outcome.code == 0
+    assert outcome.out.count("on the mesh a-atlas.obj") == 2
+    assert read_mesh(tmp_path / "a-atlas.obj").uv is not None
+    assert not list(tmp_path.glob("*.mtl"))[1:]  # that of the mesh it all began with
+    for names, words in (
+        (["a.jpg"], "a-atlas.obj, which goes with a.jpg, exists"),
+        (["b.png", "b.png"], "b.png would be written twice"),
+        (["b.png", "b-atlas.obj"], "b-atlas.obj would be written twice"),
+        (["c.ply", "c-c.png", "c.obj"], "c-c.png would be written twice"),
+    ):
+        before = sorted(tmp_path.iterdir())
+        outcome = cli(*export, *(text for name in names for text in ("--to", tmp_path / name)))
+        assert outcome.code != 0
+        assert words in outcome.err
+        assert sorted(tmp_path.iterdir()) == before
+
+
 def test_an_image_is_projected(cli, mesh, tmp_path):
     picture = np.zeros((64, 64, 3), np.uint8)
     picture[:, :32], picture[:, 32:] = [255, 0, 0], [0, 0, 255]
