@@ -2,10 +2,10 @@
 
 A file is "DDS ", a header of 124 bytes, one of 20 bytes that names the type (R32_FLOAT or
 R16_FLOAT), and the texels: x fastest, then y, then z. It has no voxel size, no place and no words;
-these stand in a ``.json`` file of the same stem, which has the keys of `raw` and the ``format``
-"meshsdf.dds/1". Without it the box of the texels is centred and its longest side is 1, with a node
-in the middle of each texel. The older way to name the two types, by a number in place of four
-letters, is read, too; of a file with smaller levels the first one is.
+these stand in a JSON file beside it (``ball.dds.json``; ``ball.json`` is read, too), which has the
+keys of `raw` and the ``format`` "meshsdf.dds/1". Without it the box of the texels is centred and
+its longest side is 1, with a node in the middle of each texel. The older way to name the two types,
+by a number in place of four letters, is read, too; of a file with smaller levels the first one is.
 
 Layout: Microsoft, "Programming guide for DDS", learn.microsoft.com/windows/win32/direct3ddds.
 """
@@ -20,7 +20,7 @@ import numpy as np
 from ..grid import Grid, NarrowBand
 from .dense_form import dense_form
 from .dense_header import DenseHeader
-from .detached import check_words, data_name, written_together
+from .detached import check_words, words_beside, words_there, written_together
 from .half import check_half, halved
 from .opened import opened, refusing
 from .raw import described, read_words, understood
@@ -63,7 +63,7 @@ def write_dds(
     Parameters
     ----------
     path : path
-        The ``.dds`` file; its ``.json`` is written beside it.
+        The ``.dds`` file; its ``.dds.json`` is written beside it.
     volume : NarrowBand or Grid
         A band becomes a full grid, see `dense_form`.
     half : bool
@@ -93,7 +93,7 @@ def write_dds(
         n = " x ".join(map(str, values.shape))
         warn(f"{n} texels are written; Direct3D loads up to {LARGEST_SIDE} a side")
     facts = described(grid, values.shape, stored, FORMAT)
-    with written_together(data_name(path, ".json"), path, force) as (words, body):
+    with written_together(words_beside(path), path, force) as (words, body):
         with open(body, "wb") as file:
             file.write(_header(values.shape, stored))
             write_values(file, values, stored)
@@ -102,11 +102,11 @@ def write_dds(
 
 def check_dds_output(path: str | os.PathLike, *, force: bool = False) -> None:
     """Refuse a place that cannot be written; IoError as `write_dds`."""
-    check_words(Path(path).with_suffix(".json"), FORMAT, ".dds", force=force)
+    check_words(words_beside(path), FORMAT, ".dds", force=force)
 
 
 def read_dds(path: str | os.PathLike, *, warn: Warn = ignore) -> Grid:
-    """Read a 3D texture of one float a texel, and the ``.json`` beside it if there is one.
+    """Read a 3D texture of one float a texel, and the JSON beside it if there is one.
 
     Parameters
     ----------
@@ -141,9 +141,11 @@ def probe_dds(path: str | os.PathLike) -> dict:
     with opened(path) as (file, _):
         header, n_levels, is_told = _read_header(path, file)
     facts = header.facts() | {"levels": n_levels}
-    if not is_told:
-        del facts["voxel_size"], facts["origin"]
-    return facts
+    if is_told:
+        return facts | {"facts_from": words_there(Path(path)).name}
+    del facts["voxel_size"], facts["origin"]
+    name = words_beside(path).name
+    return facts | {"facts_from": f"no {name} is here, so no voxel size: the longest side is 1"}
 
 
 def _header(shape: tuple[int, int, int], stored: np.dtype) -> bytes:
@@ -165,9 +167,9 @@ def _read_header(path: str | os.PathLike, file: BinaryIO) -> tuple[DenseHeader, 
     expected = _level_bytes(shape, n_levels, stored)
     if there != expected:
         raise ValueError(f"it has {there} bytes of texels, but its counts tell {expected}")
-    beside = checked_input(path).with_suffix(".json")
-    words = _words(beside) if beside.is_file() else None
-    if words is None:
+    beside = words_there(checked_input(path))
+    words = None if beside is None else _words(beside)
+    if beside is None or words is None:
         size = 1 / max(shape)
         origin = np.array([(0.5 - n / 2) * size for n in shape])
         return DenseHeader("dds", stored, shape, size, origin, {}), n_levels, False

@@ -42,8 +42,20 @@ def data_name(header: Path, suffix: str) -> Path:
     return path
 
 
+def words_beside(volume: str | os.PathLike) -> Path:
+    """The JSON file beside a volume, of its whole name: ``ball.dds.json``."""
+    path = Path(volume)
+    return path.with_name(f"{path.name}.json")
+
+
+def words_there(volume: Path) -> Path | None:
+    """The JSON file that is beside a volume, if one is; older ones have its stem: ``ball.json``."""
+    places = words_beside(volume), volume.with_suffix(".json")
+    return next((place for place in places if place.is_file()), None)
+
+
 def check_words(place: Path, format: str, suffix: str, *, force: bool) -> None:
-    """Refuse to replace the JSON file of something else, which happens to have the same stem.
+    """Refuse to replace a JSON file of something else, which happens to have its name.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from ..arrays import Number
 from ..errors import IoError
 from ..grid import Grid, NarrowBand
 from .dense_form import dense_form
-from .detached import check_words, written_together
+from .detached import check_words, words_beside, written_together
 from .exr_facts import FORMAT, PREFIX, ExrFacts, LayoutName, parse_facts
 from .exr_header import Part, read_parts
 from .exr_layout import Slicing, Up, nearly_square
@@ -112,7 +112,7 @@ def check_exr_output(path: str | os.PathLike, *, force: bool = False) -> Path:
     IoError
         As `check_output`, of that file; or it holds something else, even with ``force``.
     """
-    place = Path(path).with_suffix(".json")
+    place = words_beside(path)
     check_words(place, FORMAT, ".exr", force=force)
     return place
 

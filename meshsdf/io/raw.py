@@ -1,6 +1,7 @@
-"""Bare values in a ``.raw`` file, and what they are in a ``.json`` file of the same stem.
+"""Bare values in a ``.raw`` file, and what they are in a JSON file beside it (``ball.raw.json``).
 
-What engines and scripts read without any library. The JSON object:
+What engines and scripts read without any library. A JSON file of the same stem (``ball.json``) is
+read, too. The JSON object:
 
 - ``format``: "meshsdf.raw/1"
 - ``shape``: [ni, nj, nk], nodes along x, y and z
@@ -28,7 +29,7 @@ from ..errors import IoError
 from ..grid import Grid, NarrowBand
 from .dense_form import dense_form
 from .dense_header import PREFIX, DenseHeader, one_spacing, told_of
-from .detached import data_name, written_together
+from .detached import words_beside, words_there, written_together
 from .half import check_half, halved
 from .opened import opened
 from .registry import checked_input
@@ -57,7 +58,7 @@ def write_raw(
     Parameters
     ----------
     path : path
-        The ``.raw`` file; its ``.json`` is written beside it.
+        The ``.raw`` file; its ``.raw.json`` is written beside it.
     volume : NarrowBand or Grid
         A band becomes a full grid, see `dense_form`.
     half : bool
@@ -82,15 +83,14 @@ def write_raw(
         check_half(values, f"output {path}")
         values = halved(values)
     facts = described(grid, values.shape, values.dtype, FORMAT)
-    header = data_name(path, ".json")
-    with written_together(header, path, force) as (head, body):
+    with written_together(words_beside(path), path, force) as (head, body):
         with open(body, "wb") as file:
             write_values(file, values, values.dtype.newbyteorder("<"))
         head.write_text(facts, encoding="utf-8", newline="\n")
 
 
 def read_raw(path: str | os.PathLike, *, warn: Warn = ignore) -> Grid:
-    """Read a ``.raw`` file and the ``.json`` beside it.
+    """Read a ``.raw`` file and the JSON beside it.
 
     Parameters
     ----------
@@ -117,9 +117,10 @@ def read_raw(path: str | os.PathLike, *, warn: Warn = ignore) -> Grid:
 
 
 def probe_raw(path: str | os.PathLike) -> dict:
-    """Return what the ``.json`` says: ``kind``, ``dtype``, ``shape``, ``voxel_size``, …"""
+    """Return what the JSON says: ``kind``, ``dtype``, ``shape``, ``voxel_size``, …"""
     header, is_x_fastest = _read_header(path)
-    return header.facts() | {"order": "x_fastest" if is_x_fastest else "z_fastest"}
+    order = "x_fastest" if is_x_fastest else "z_fastest"
+    return header.facts() | {"order": order, "facts_from": words_there(Path(path)).name}
 
 
 def described(grid: Grid, shape: tuple[int, ...], dtype: np.dtype, format: str) -> str:
@@ -147,12 +148,12 @@ def _read_z_fastest(read, shape: tuple[int, int, int], stored: np.dtype) -> np.n
 def _read_header(path: str | os.PathLike) -> tuple[DenseHeader, bool]:
     """What the JSON beside a file says, and whether x is fastest."""
     path = checked_input(path)
-    beside = path.with_suffix(".json")
-    if not beside.is_file():
+    beside = words_there(path)
+    if beside is None:
         others = [path.with_suffix(suffix) for suffix in _OTHER_HEADERS]
         other = next((str(header) for header in others if header.is_file()), None)
-        fix = f"read {other}" if other else f"write {beside.name} beside it"
-        what = f"there is no {beside.name} that tells what is in {path.name}"
+        fix = f"read {other}" if other else f"write {words_beside(path).name} beside it"
+        what = f"there is no {words_beside(path).name} that tells what is in {path.name}"
         raise IoError(what, f"file {path}", fix)
     with opened(beside) as (file, _):
         header, is_x_fastest = understood(read_words(file), FORMAT)

@@ -8,10 +8,11 @@ from pathlib import Path
 from ..errors import IoError
 from ..grid import Grid, NarrowBand
 from .atomic import check_output
+from .detached import words_beside
 from .registry import checked_input, format_of
 from .warn import Warn, ignore
 
-_BESIDE = {".raw": ".json", ".nhdr": ".raw.gz", ".mhd": ".zraw"}
+_BESIDE = {".nhdr": ".raw.gz", ".mhd": ".zraw"}
 """Suffixes of the second file of a volume, as `write_volume` names it."""
 
 
@@ -108,6 +109,8 @@ def check_volume_output(path: str | os.PathLike, *, force: bool = False) -> None
         from .dds import check_dds_output
 
         check_dds_output(path, force=force)
+    elif suffix == ".raw":
+        check_output(words_beside(path), force)
     elif suffix in _BESIDE:
         check_output(Path(path).with_suffix(_BESIDE[suffix]), force)
 

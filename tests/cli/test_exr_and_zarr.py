@@ -72,9 +72,9 @@ def test_options_that_do_not_suit_are_misuse(cli, tmp_path, out, options, words)
 
 
 def test_a_strangers_json_stops_the_command_before_any_work(cli, tmp_path):
-    (tmp_path / "a.json").write_text(json.dumps({"mine": 1}))
+    (tmp_path / "a.exr.json").write_text(json.dumps({"mine": 1}))
     mesh = ball(tmp_path / "b.ply")
     for options in ([], ["--force"]):
         outcome = cli("convert", mesh, tmp_path / "a.exr", "--resolution", "1e9", *options)
         assert outcome.code == 3
-        assert "a.json" in outcome.err
+        assert "a.exr.json" in outcome.err

@@ -49,8 +49,8 @@ WAYS = {
     "mhd plain": Way(".mhd", *_META, {"compressed": False}, ".raw"),
     "vti": Way(".vti", *_VTI),
     "vti plain": Way(".vti", *_VTI, {"compressed": False}),
-    "raw": Way(".raw", write_raw, read_raw, probe_raw, {}, ".json"),
-    "dds": Way(".dds", write_dds, read_dds, probe_dds, {}, ".json"),
+    "raw": Way(".raw", write_raw, read_raw, probe_raw, {}, ".raw.json"),
+    "dds": Way(".dds", write_dds, read_dds, probe_dds, {}, ".dds.json"),
     "vf": Way(".vf", write_vf, read_vf, probe_vf),
     "sdf": Way(".sdf", write_sdfgen, read_sdfgen, probe_sdfgen),
 }

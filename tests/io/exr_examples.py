@@ -23,7 +23,7 @@ def header_of(path, part=0) -> dict:
 
 def facts_beside(path) -> dict:
     """The JSON file beside an .exr file."""
-    return json.loads(path.with_suffix(".json").read_text())
+    return json.loads(path.with_name(f"{path.name}.json").read_text())
 
 
 def random_grid(seed: int, shape=None, *, gaps: bool = False) -> Grid:

@@ -19,7 +19,7 @@ from tests.io.dense_examples import CENTER, STEP, assert_centered, center_of_ins
 def test_a_raw_file_is_what_its_json_says(tmp_path):
     grid = sphere_grid()
     write_raw(tmp_path / "a.raw", grid)
-    facts = json.loads((tmp_path / "a.json").read_text())
+    facts = json.loads((tmp_path / "a.raw.json").read_text())
     assert facts == {
         "format": "meshsdf.raw/1",
         "shape": [27, 26, 28],
@@ -62,7 +62,9 @@ def test_raw_values_of_every_type_and_order_are_read(tmp_path, kind, order):
 
 def test_a_raw_file_without_json_says_where_to_look(tmp_path):
     (tmp_path / "a.raw").write_bytes(bytes(8))
-    with pytest.raises(IoError, match=r"there is no a\.json .*\n.*\n.*write a\.json beside it"):
+    with pytest.raises(
+        IoError, match=r"there is no a\.raw\.json .*\n.*\n.*write a\.raw\.json beside it"
+    ):
         read_volume(tmp_path / "a.raw")
     write_volume(tmp_path / "b.mhd", Grid(np.zeros((2, 2, 2)), 1.0, np.zeros(3)))
     (tmp_path / "b.raw").write_bytes(bytes(8))

@@ -54,7 +54,7 @@ def test_a_texture_is_a_header_and_texels_with_x_fastest(tmp_path):
         pitch = 27 * texels.itemsize
         assert data == texture(texels, number=number, pitch=pitch)
         assert len(data) == 148 + texels.nbytes
-        facts = json.loads((tmp_path / "a.json").read_text())
+        facts = json.loads((tmp_path / "a.dds.json").read_text())
         assert (facts["format"], facts["shape"]) == ("meshsdf.dds/1", [27, 26, 28])
         assert facts["dtype"] == texels.dtype.name
         flat = np.frombuffer(data, kind, offset=148)
@@ -91,7 +91,7 @@ def test_a_texture_of_others_gets_a_centred_box_and_says_so(tmp_path, number, le
     (tmp_path / "a.dds").write_bytes(texture(values, number=number, letters=letters))
     for strange in (None, '{"format": "another/1"}', '{"mine": 1}'):
         if strange is not None:
-            (tmp_path / "a.json").write_text(strange)
+            (tmp_path / "a.dds.json").write_text(strange)
         notes = []
         grid = read_volume(tmp_path / "a.dds", warn=notes.append)
         assert_array_equal(grid.values, values.transpose(2, 1, 0))
@@ -143,26 +143,26 @@ def test_other_textures_are_refused_with_what_they_are(tmp_path):
 
 def test_a_json_that_tells_of_another_texture_is_refused(tmp_path):
     write_volume(tmp_path / "a.dds", sphere_grid())
-    words = (tmp_path / "a.json").read_text()
+    words = (tmp_path / "a.dds.json").read_text()
     for old, new, told in (
         ("26", "27", "it tells 27 x 27 x 28 float32, the .dds holds 27 x 26 x 28 float32"),
         ("float32", "float16", "it tells 27 x 26 x 28 float16"),
         ("dds/1", "dds/2", "its format is"),
-        ('"format"', '"format', "a.json is not a readable volume"),
+        ('"format"', '"format', "a.dds.json is not a readable volume"),
     ):
-        (tmp_path / "a.json").write_text(words.replace(old, new, 1))
+        (tmp_path / "a.dds.json").write_text(words.replace(old, new, 1))
         with pytest.raises(IoError, match=told):
             read_volume(tmp_path / "a.dds")
 
 
 def test_a_strangers_json_is_never_replaced(tmp_path):
-    (tmp_path / "a.json").write_text('{"mine": 1}')
+    (tmp_path / "a.dds.json").write_text('{"mine": 1}')
     for force in (False, True):
         with pytest.raises(IoError, match=r"the output exists|does not belong to the \.dds volume"):
             write_volume(tmp_path / "a.dds", sphere_grid(), force=force)
         with pytest.raises(IoError, match=r"the output exists|does not belong to the \.dds volume"):
             check_volume_output(tmp_path / "a.dds", force=force)
-    assert [file.name for file in tmp_path.iterdir()] == ["a.json"]
+    assert [file.name for file in tmp_path.iterdir()] == ["a.dds.json"]
 
 
 def test_what_no_graphics_card_loads_is_written_with_a_word(tmp_path):
@@ -171,3 +171,23 @@ def test_what_no_graphics_card_loads_is_written_with_a_word(tmp_path):
     write_volume(tmp_path / "a.dds", long, warn=notes.append)
     assert notes == ["2049 x 1 x 1 texels are written; Direct3D loads up to 2048 a side"]
     assert read_volume(tmp_path / "a.dds").values.shape == (2049, 1, 1)
+
+
+def test_volumes_of_one_stem_keep_their_facts_apart_and_older_names_are_read(tmp_path):
+    grid = sphere_grid()
+    for suffix in (".dds", ".raw", ".exr"):
+        write_volume(tmp_path / f"s{suffix}", grid)
+    for suffix in (".dds", ".raw", ".exr"):
+        found = read_volume(tmp_path / f"s{suffix}")
+        assert_array_equal(found.values, grid.values)
+        assert found.voxel_size == grid.voxel_size
+    for suffix in (".dds", ".raw"):
+        beside, older = tmp_path / f"s{suffix}.json", tmp_path / "s.json"
+        assert probe_volume(tmp_path / f"s{suffix}")["facts_from"] == beside.name
+        beside.rename(older)
+        assert read_volume(tmp_path / f"s{suffix}").voxel_size == grid.voxel_size
+        assert probe_volume(tmp_path / f"s{suffix}")["facts_from"] == "s.json"
+    # The last is of the .raw volume, so the texture has none
+    told = probe_volume(tmp_path / "s.dds")
+    assert "voxel_size" not in told
+    assert told["facts_from"].startswith("no s.dds.json is here, so no voxel size")

@@ -109,7 +109,7 @@ def test_files_that_exist_are_left_alone(tmp_path, way):
 @pytest.mark.parametrize("name", [name for name in WAYS if WAYS[name].beside])
 def test_of_two_files_the_one_that_names_the_other_comes_last(tmp_path, name):
     path = written(WAYS[name], tmp_path, sphere_grid())
-    header = path.with_suffix(".json") if WAYS[name].beside == ".json" else path
+    header = path.with_suffix(WAYS[name].beside) if "json" in WAYS[name].beside else path
     (data,) = set(tmp_path.iterdir()) - {header}
     assert data.name in header.read_text() or header.suffix == ".json"
     # Taking its name is the last thing that happens to a file

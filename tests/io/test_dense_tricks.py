@@ -181,7 +181,7 @@ def test_a_header_cannot_name_a_folder_or_nothing(tmp_path):
 
 def test_deep_brackets_and_long_numbers_are_no_json_of_ours(tmp_path):
     way, path, _ = files_of("raw", tmp_path)
-    header = path.with_suffix(".json")
+    header = path.with_suffix(".raw.json")
     whole = header.read_bytes()
     cases = [
         (b"[" * 200_000, "nested too deeply"),

@@ -210,7 +210,7 @@ def test_the_header_and_the_json_beside_it_say_the_same(tmp_path):
     assert beside["value_range"] == [grid.values.min(), grid.values.max()]
     assert_allclose(beside["lower"], grid.origin - grid.voxel_size / 2)
     assert_allclose(beside["upper"], grid.origin + grid.voxel_size * (np.array([5, 4, 7]) - 0.5))
-    (tmp_path / "a.json").unlink()
+    (tmp_path / "a.exr.json").unlink()
     assert read_exr(tmp_path / "a.exr").values.shape == (5, 4, 7)
 
 
@@ -264,19 +264,19 @@ def test_what_cannot_be_is_refused_and_nothing_is_left(tmp_path):
 def test_neither_file_is_replaced_unless_asked_and_a_strangers_json_never_is(tmp_path):
     grid, _ = ball((3, 4, 5))
     write_exr(tmp_path / "a.exr", grid)
-    with pytest.raises(IoError, match=r"(?s)the output exists.*a\.json"):
+    with pytest.raises(IoError, match=r"(?s)the output exists.*a\.exr\.json"):
         write_exr(tmp_path / "a.exr", grid)
-    (tmp_path / "a.json").unlink()
+    (tmp_path / "a.exr.json").unlink()
     with pytest.raises(IoError, match=r"(?s)the output exists.*a\.exr"):
         write_exr(tmp_path / "a.exr", grid)
     write_exr(tmp_path / "a.exr", grid, force=True)
     write_exr(tmp_path / "a.exr", grid, force=True)
-    (tmp_path / "a.json").write_text('{"mine": 1}')
+    (tmp_path / "a.exr.json").write_text('{"mine": 1}')
     for force in (False, True):
         with pytest.raises(IoError, match=r"the output exists|does not belong to the \.exr volume"):
             write_exr(tmp_path / "a.exr", grid, force=force)
-    assert (tmp_path / "a.json").read_text() == '{"mine": 1}'
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.exr", "a.json"]
+    assert (tmp_path / "a.exr.json").read_text() == '{"mine": 1}'
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.exr", "a.exr.json"]
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")

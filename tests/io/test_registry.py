@@ -73,7 +73,7 @@ def test_a_writer_takes_its_own_options_and_no_others(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "beside"),
-    [("a.raw", "a.json"), ("a.exr", "a.json"), ("a.nhdr", "a.raw.gz"), ("a.mhd", "a.zraw")],
+    [("a.raw", "a.raw.json"), ("a.exr", "a.exr.json"), ("a.nhdr", "a.raw.gz"), ("a.mhd", "a.zraw")],
 )
 def test_files_beside_an_output_are_judged_with_it(tmp_path, name, beside):
     grid = Grid(np.ones((2, 2, 2), np.float32), 1.0, np.zeros(3))
