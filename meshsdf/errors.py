@@ -69,6 +69,10 @@ class IoError(MeshsdfError):
     """A file cannot be read or written."""
 
 
+class OutputError(IoError):
+    """A file cannot be written there: its name, its folder or what is there forbids it."""
+
+
 class ServerError(MeshsdfError):
     """The painting page's server is asked for what it cannot or may not do."""
 

@@ -1,7 +1,8 @@
 """The command ``meshsdf``: finds the subcommand, runs it, turns errors into exit codes.
 
-Exit codes: 0 done, the answer is yes; 1 done, the answer is no; 2 misuse; 3 the input cannot be
-used or would not fit in memory; 130 interrupted; 143 told to end (SIGTERM).
+Exit codes: 0 done, the answer is yes; 1 done, the answer is no; 2 misuse, or an output that exists
+or cannot be written there; 3 the input cannot be used or would not fit in memory; 130 interrupted;
+143 told to end (SIGTERM).
 """
 
 import gc
@@ -15,8 +16,8 @@ from pathlib import Path
 
 import click
 
-from ..errors import MemoryLimitError, MeshsdfError
-from .console import CTRL_C, INTERRUPTED, UNUSABLE
+from ..errors import MemoryLimitError, MeshsdfError, OutputError
+from .console import CTRL_C, INTERRUPTED, MISUSE, UNUSABLE
 
 COMMANDS = {
     "check": "Does a mesh part space into inside and outside? Says where it does not.",
@@ -129,7 +130,7 @@ class UnexpectedError(MeshsdfError):
 
 def _refuse(error: MeshsdfError) -> int:
     click.echo(f"{type(error).__name__}: {error}", err=True)
-    return UNUSABLE
+    return MISUSE if isinstance(error, OutputError) else UNUSABLE
 
 
 def _fault(error: Exception) -> tuple[str, str, str]:

@@ -20,18 +20,21 @@ report_option = click.option(
 
 def check_reports(reports: tuple[str, ...], force: bool) -> None:
     """Refuse before any work starts what could not be written after it."""
-    from ..errors import IoError
+    from ..errors import OutputError, ReportError
     from ..io import check_output
     from ..report.formats import format_of
 
     for name in reports:
-        format_of(name)
+        try:
+            format_of(name)
+        except ReportError as error:
+            raise OutputError(error.what, error.where, error.fix) from None
         check_output(name, force)
     places = [os.path.realpath(name) for name in reports]
     for i, place in enumerate(places):
         if place in places[:i]:
             what = "two reports would be written to one file"
-            raise IoError(what, f"--report {reports[i]}", "name each once")
+            raise OutputError(what, f"--report {reports[i]}", "name each once")
 
 
 def write_reports(

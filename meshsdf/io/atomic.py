@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import IoError
+from ..errors import IoError, OutputError
 from .registry import Kind, folder_marker, format_of
 
 _FULL = {errno.ENOSPC, errno.EDQUOT}
@@ -34,7 +34,7 @@ def check_output(path: str | os.PathLike, force: bool = False, *, kind: Kind | N
 
     Raises
     ------
-    IoError
+    OutputError
         The suffix does not suit the kind, the file exists and ``force`` is false, it is a folder
         (but no volume that is one) or a device, its folder is missing or allows no new files.
     """
@@ -44,24 +44,27 @@ def check_output(path: str | os.PathLike, force: bool = False, *, kind: Kind | N
     where = f"output {path}"
     folder = target.parent
     if not folder.exists():
-        raise IoError(f"folder {folder} does not exist", where, "create the folder first")
+        raise OutputError(f"folder {folder} does not exist", where, "create the folder first")
     if not folder.is_dir():
-        raise IoError(f"{folder} is a file, not a folder", where, "name another folder")
+        raise OutputError(f"{folder} is a file, not a folder", where, "name another folder")
     try:
         mode = os.lstat(target).st_mode
     except FileNotFoundError:
         mode = None
     except OSError as error:
-        raise IoError(f"cannot write: {error.strerror}", where, "choose another name") from error
+        raise OutputError(
+            f"cannot write: {error.strerror}", where, "choose another name"
+        ) from error
     if mode is not None:
         if stat.S_ISDIR(mode):
             _check_old_folder(target, where)
         elif not stat.S_ISREG(mode):
-            raise IoError("the output is not a regular file", where, "give the name of a file")
+            raise OutputError("the output is not a regular file", where, "give the name of a file")
         if not force:
             raise _exists(where)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise _not_writable(folder, where)
+    _try(folder, where)
 
 
 @contextmanager
@@ -185,9 +188,9 @@ def make_folder(path: str | os.PathLike) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
         what = "a file stands where the folder should be"
-        raise IoError(what, f"folder {path}", "name another folder") from None
+        raise OutputError(what, f"folder {path}", "name another folder") from None
     except OSError as error:
-        raise IoError(
+        raise OutputError(
             f"the folder cannot be made: {error.strerror}", f"folder {path}", "name another folder"
         ) from error
     return Path(path)
@@ -196,8 +199,23 @@ def make_folder(path: str | os.PathLike) -> Path:
 def _target(path: str | os.PathLike) -> Path:
     """The file behind a symbolic link, so that the link itself survives."""
     if "\0" in os.fspath(path):
-        raise IoError("no file can have a zero byte in its name", f"output {path!r}", "rename it")
+        raise OutputError(
+            "no file can have a zero byte in its name", f"output {path!r}", "rename it"
+        )
     return Path(os.path.realpath(path))
+
+
+def _try(folder: Path, where: str) -> None:
+    """Make a file in the folder, and remove it: some refuse even those whom their modes allow."""
+    file = folder / f".meshsdf-{secrets.token_hex(8)}"
+    try:
+        os.close(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
+    except OSError as error:
+        if error.errno not in _FULL:
+            raise _not_writable(folder, where) from error
+    finally:
+        with suppress(OSError):
+            file.unlink(missing_ok=True)
 
 
 def _flush(path: Path) -> None:
@@ -218,10 +236,10 @@ def _check_old_folder(target: Path, where: str) -> None:
     """IoError unless the folder is a volume, which may be replaced as a file may."""
     marker = folder_marker(target)
     if not marker:
-        raise IoError("the output is a folder", where, "give the name of a file in it")
+        raise OutputError("the output is a folder", where, "give the name of a file in it")
     if not (target / marker).is_file():
         what = f"the output is a folder without {marker}, so no volume; it is not replaced"
-        raise IoError(what, where, "choose another name")
+        raise OutputError(what, where, "choose another name")
 
 
 def _place_folder(temporary: Path, target: Path, force: bool, where: str) -> None:
@@ -278,9 +296,11 @@ def _explained(error: OSError, folder: Path, where: str) -> IoError:
     return IoError(what, where, "try another folder or disk")
 
 
-def _exists(where: str) -> IoError:
-    return IoError("the output exists", where, "pass --force (force=True) to replace it")
+def _exists(where: str) -> OutputError:
+    return OutputError("the output exists", where, "pass --force to replace it")
 
 
-def _not_writable(folder: Path, where: str) -> IoError:
-    return IoError(f"folder {folder} is not writable", where, "choose a folder you may write to")
+def _not_writable(folder: Path, where: str) -> OutputError:
+    return OutputError(
+        f"folder {folder} is not writable", where, "choose a folder you may write to"
+    )

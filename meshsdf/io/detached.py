@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
-from ..errors import IoError
+from ..errors import IoError, OutputError
 from .atomic import atomic_write, check_output
 from .registry import checked_input
 from .vdb_stream import UnsuitedError, printable
@@ -76,7 +76,7 @@ def check_words(place: Path, format: str, suffix: str, *, force: bool) -> None:
     check_output(place, force)
     if place.exists() and format.split("/")[0].encode() not in _start_of(place):
         what = f"this JSON file does not belong to the {suffix} volume, and would be replaced"
-        raise IoError(what, f"output {place}", "move it away, or choose another name")
+        raise OutputError(what, f"output {place}", "move it away, or choose another name")
 
 
 def _start_of(path: Path) -> bytes:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float32
 
-from ..errors import IoError
+from ..errors import IoError, OutputError
 from ..ray.images import jpeg_bytes, png_bytes
 from .atomic import atomic_write, check_output
 from .exr_picture import read_exr_picture
@@ -33,7 +33,7 @@ def check_picture(path: str | os.PathLike, force: bool = False) -> None:
         what = f"a picture with suffix {suffix!r} cannot be written"
         if not suffix:
             what = "the name has no suffix, so the format of the picture is unknown"
-        raise IoError(what, f"output {path}", f"use one of {', '.join(SUFFIXES)}")
+        raise OutputError(what, f"output {path}", f"use one of {', '.join(SUFFIXES)}")
     check_output(path, force)
 
 

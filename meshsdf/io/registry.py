@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
-from ..errors import IoError
+from ..errors import IoError, OutputError
 
 Kind = Literal["mesh", "volume"]
 
@@ -147,7 +147,8 @@ def format_of(path: str | os.PathLike, kind: Kind | None = None, task: str = "re
     Raises
     ------
     IoError
-        No such format; the message lists those there are and suggests the nearest.
+        No such format (`OutputError` for a writer); the message lists those there are and suggests
+        the nearest.
     """
     suffix = suffix_of(path)
     able = [f for f in FORMATS if kind in (None, f.kind) and getattr(f, task)]
@@ -164,7 +165,8 @@ def format_of(path: str | os.PathLike, kind: Kind | None = None, task: str = "re
     hint = f"; did you mean {near[0]}?" if near and suffix not in suffixes() else ""
     if others and kind is not None:
         what = f"a {kind} with suffix {suffix!r} cannot be {verb}: that is a {others[0]}"
-    raise IoError(what, f"file {path}", f"use one of {', '.join(known)}{hint}")
+    error = OutputError if task == "writer" else IoError
+    raise error(what, f"file {path}", f"use one of {', '.join(known)}{hint}")
 
 
 def kind_of(path: str | os.PathLike) -> Kind:

@@ -32,7 +32,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..errors import IoError
+from ..errors import OutputError
 from ..sdf.samples import KINDS, Samples
 from .atomic import atomic_write, check_output
 from .npy_archive import write_archive
@@ -56,14 +56,14 @@ _PLY_TYPES = {"f4": "float", "f8": "double", "i1": "char", "i4": "int"}
 def check_samples_output(
     path: str | os.PathLike, *, layout: Layout = "plain", force: bool = False
 ) -> None:
-    """IoError if samples could not be written there, before any work starts."""
+    """OutputError if samples could not be written there, before any work starts."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         what = f"samples cannot be written with suffix {suffix!r}"
-        raise IoError(what, f"output {path}", f"use one of {', '.join(SUFFIXES)}")
+        raise OutputError(what, f"output {path}", f"use one of {', '.join(SUFFIXES)}")
     if layout == "deepsdf" and suffix != ".npz":
         what = f"DeepSDF's layout is that of .npz files, not of {suffix}"
-        raise IoError(what, f"output {path}", "give the output the suffix .npz")
+        raise OutputError(what, f"output {path}", "give the output the suffix .npz")
     check_output(path, force)
 
 

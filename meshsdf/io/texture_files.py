@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..arrays import Number
-from ..errors import IoError
+from ..errors import OutputError
 from ..mesh import Mesh
 from ..texture.atlas import Atlas, Method, atlas_colors, atlas_for, textured, vertex_colored
 from ..texture.volume_texture import VolumeTexture
@@ -54,7 +54,9 @@ def check_texture_output(path: str | os.PathLike, force: bool = False) -> None:
     for place in companions(path):
         if place.exists() and not force:
             what = f"{place.name}, which goes with {Path(path).name}, exists"
-            raise IoError(what, f"output {path}", "pass --force to replace it, or take other names")
+            raise OutputError(
+                what, f"output {path}", "pass --force to replace it, or take other names"
+            )
         check_output(place, force)
 
 
@@ -72,7 +74,7 @@ def check_texture_outputs(paths: Sequence[str | os.PathLike], force: bool = Fals
             owner = f"the mesh of {place.stem}" if place == shared else os.fspath(path)
             if key in taken and not (place == shared and taken[key] == owner):
                 what = f"{place.name} would be written twice"
-                raise IoError(what, f"output {path}", "name each file once, with other stems")
+                raise OutputError(what, f"output {path}", "name each file once, with other stems")
             taken[key] = owner
 
 

@@ -33,7 +33,7 @@ def test_the_demo_leaves_files_that_open_and_overwrites_nothing(cli, tmp_path):
     assert json.loads((folder / "check.json").read_text())["two_set"] is True
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     outcome = cli("demo", folder)
-    assert outcome.code == 3
+    assert outcome.code == 2
     assert "the output exists" in outcome.err
     outcome = cli("demo", folder, "--force")
     assert outcome.code == 0
@@ -46,5 +46,5 @@ def test_the_demo_leaves_files_that_open_and_overwrites_nothing(cli, tmp_path):
 def test_a_file_where_the_folder_should_be_is_refused(cli, tmp_path):
     (tmp_path / "file").write_text("precious")
     outcome = cli("demo", tmp_path / "file")
-    assert outcome.code == 3
+    assert outcome.code == 2
     assert "a file stands where the folder should be" in outcome.err

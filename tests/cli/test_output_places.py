@@ -24,15 +24,15 @@ def test_an_existing_output_is_kept_without_force_and_replaced_with_it(cli, mesh
     out = tmp_path / "a.npz"
     out.write_text("precious")
     outcome = convert(cli, mesh, out)
-    assert outcome.code == 3
+    assert outcome.code == 2
     assert "the output exists" in outcome.err
-    assert "--force" in outcome.err
+    assert "pass --force to replace it" in outcome.err
     assert out.read_text() == "precious"
     assert convert(cli, mesh, out, "--force").code == 0
     assert read_volume(out).n_active > 0
     surface = tmp_path / "b.obj"
     surface.write_text("precious")
-    assert cli("mesh", out, surface).code == 3
+    assert cli("mesh", out, surface).code == 2
     assert surface.read_text() == "precious"
     assert cli("mesh", out, surface, "--force").code == 0
     assert read_mesh(surface).n_faces > 0
@@ -51,16 +51,18 @@ def test_the_output_is_judged_before_the_input_is_loaded(cli, mesh, tmp_path, mo
         (tmp_path / "a.nzp", "a volume with suffix '.nzp' cannot be written"),
     ):
         outcome = convert(cli, mesh, out)
-        assert outcome.code == 3
+        assert outcome.code == 2
         assert words in outcome.err
 
 
-def test_a_folder_that_takes_no_files_is_told(cli, mesh):
+def test_a_folder_that_takes_no_files_is_told_before_any_work(cli, mesh, monkeypatch):
     if not os.path.isdir("/proc/self/fd"):
         pytest.skip("this system has no folder that refuses even its administrator")
+    monkeypatch.setattr("meshsdf.io.meshes.read_mesh", None)
     outcome = convert(cli, mesh, "/proc/self/a.npz")
-    assert outcome.code == 3
-    assert "IoError: " in outcome.err
+    assert outcome.code == 2
+    assert "OutputError: folder /proc/" in outcome.err
+    assert "is not writable" in outcome.err
     assert "output /proc/self/a.npz" in outcome.err
 
 

@@ -78,7 +78,7 @@ def test_reports_are_judged_before_the_mesh_is_loaded(cli, mesh, tmp_path, monke
     ):
         asked = [word for name in names for word in ("--report", name)]
         outcome = roundtrip(cli, mesh, *asked)
-        assert outcome.code == 3
+        assert outcome.code == 2
         assert words in outcome.err
     assert old.read_text() == "precious"
 

@@ -127,10 +127,10 @@ def test_what_cannot_be_is_refused_before_the_mesh_is_read(cli, mesh, tmp_path, 
 
     monkeypatch.setattr("meshsdf.io.meshes.read_mesh", load)
     outcome = cli("sample", mesh, tmp_path / "a.csv")
-    assert outcome.code == 3
+    assert outcome.code == 2
     assert "samples cannot be written with suffix '.csv'" in outcome.err
     outcome = cli("sample", mesh, tmp_path / "a.ply", "--layout", "deepsdf")
-    assert outcome.code == 3
+    assert outcome.code == 2
     (tmp_path / "a.npz").write_text("precious")
-    assert cli("sample", mesh, tmp_path / "a.npz").code == 3
+    assert cli("sample", mesh, tmp_path / "a.npz").code == 2
     assert (tmp_path / "a.npz").read_text() == "precious"
