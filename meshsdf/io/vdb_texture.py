@@ -36,7 +36,8 @@ class _Colors:
         entries, brick = _with_other_sheets(octree, entries)
         points, normals = self.texture.places(entries)
         spacing = octree.spacing(self.level)
-        colors = self.texture.colors(points, normals, spacing)
+        parts = self.texture.texel_parts(entries)
+        colors = self.texture.colors(points, normals, spacing, parts=parts)
         first = octree.tables.texel_first
         owner = np.repeat(brick, first[entries + 1] - first[entries])
         node = np.rint(points / spacing).astype(np.int64) - 8 * bricks[owner]
@@ -120,11 +121,15 @@ def _with_other_sheets(octree, entries: np.ndarray) -> tuple[np.ndarray, np.ndar
     if len(groups) == 0:
         return entries, brick
     order = np.searchsorted(groups[:, 0], entries, side="right") - 1
-    inside = (order >= 0) & (entries < groups[order].sum(axis=1))
-    other = np.where(entries == groups[order, 0], entries + 1, entries - 1)[inside]
+    first, count = groups[order, 0], groups[order, 1]
+    inside = np.flatnonzero((order >= 0) & (entries < first + count))
+    row = np.repeat(inside, count[inside])
+    begin = np.repeat(np.cumsum(count[inside]) - count[inside], count[inside])
+    all_sheets = first[row] + np.arange(len(row)) - begin
+    other = all_sheets != entries[row]
     return (
-        np.concatenate([entries, other]).astype(np.int32),
-        np.concatenate([brick, brick[inside]]),
+        np.concatenate([entries, all_sheets[other]]).astype(np.int32),
+        np.concatenate([brick, brick[row[other]]]),
     )
 
 

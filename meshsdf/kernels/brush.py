@@ -14,6 +14,7 @@ from numba import njit
 from .blending import NORMAL, composite
 from .brush_reach import HALF_DIAGONAL, MARGIN, ROW, segment_distance2
 from .texel_codes import F0, F1, HALF1, VALUE8, decode, encode
+from .texel_neighbors import is_beside, parts_beside
 from .texture_lookup import ABSENT, FIRST_TILE, read_texel
 
 FALLOFFS = ("smooth", "linear", "round")
@@ -59,16 +60,17 @@ def picture_value(picture, u, v):
 
 @njit(cache=True, nogil=True)
 def deposit(
-    tables, found, begin, end, slots, marks, dabs, copies, tip, numbers, stamp, stencil, matrix,
-    gates, coverage, changed, state,
+    tables, found, begin, end, slots, marks, dabs, parts, copies, tip, numbers, stamp, stencil,
+    matrix, gates, coverage, changed, state,
 ):  # fmt: skip
     """Let dabs cover the texels of the entries ``found[begin:end]``.
 
-    ``copies`` dabs after another are one step of the stroke; of these the strongest counts. ``tip``
-    is falloff, build-up, has stamp, has stencil, is gated; ``numbers`` hardness and the two
-    cosines; ``matrix`` takes finest nodes to the stencil. ``gates`` (dabs, found, 8) uint64 are the
-    texels connected to a dab, if it is gated. Sets rows of ``coverage``, the bits of texels whose
-    coverage changed, (found, 8), and for each entry whether it is WANTED (dabs come near) and
+    ``parts`` (d,) are those that dabs are on, as bits: where sheets are divided, they cover no
+    other part. ``copies`` dabs after another are one step of the stroke; of these the strongest
+    counts. ``tip`` is falloff, build-up, has stamp, has stencil, is gated; ``numbers`` hardness and
+    the two cosines; ``matrix`` takes finest nodes to the stencil. ``gates`` (dabs, found, 8) uint64
+    are the texels connected to a dab, if it is gated. Sets rows of ``coverage``, the bits of texels
+    whose coverage changed, (found, 8), and for each entry whether it is WANTED (dabs come near) and
     CHANGED.
     """
     places = np.empty((8, 512), np.float32)
@@ -82,6 +84,7 @@ def deposit(
         for axis in range(3):
             origin[axis] = 8.0 * tables.bricks[e, axis]
         n, is_new = -1, slots[e] == ABSENT
+        beside = parts_beside(tables, e)
         row = coverage[marks[e, ROW] - 1]
         state[i] = 0
         changed[i, :] = np.uint64(0)
@@ -89,6 +92,8 @@ def deposit(
             covered = False
             for d in range(step, step + copies):
                 if not _is_near(dabs, d, shrink, origin):
+                    continue
+                if beside and is_beside(tables, e, beside, parts[d]):
                     continue
                 if n < 0:
                     n = _unpack(tables.masks, e, places, which)

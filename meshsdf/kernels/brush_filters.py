@@ -7,9 +7,10 @@ texel does not see what its neighbours become. Means are taken in linear light, 
 import numpy as np
 from numba import njit
 
-from .octree_tables import SELF
+from .octree_tables import SELF, part_bit
 from .sheets import decode_normal
 from .texel_codes import F0, F1, encode
+from .texel_neighbors import beside_texel
 from .texture_lookup import ABSENT, needed, read_texel, stored_value
 
 
@@ -31,7 +32,7 @@ def blurred(
             for n in range(27):
                 dx, dy, dz = n // 9 - 1, n // 3 % 3 - 1, n % 3 - 1
                 x, y, z = (t >> 6) + dx, ((t >> 3) & 7) + dy, (t & 7) + dz
-                f = tables.neighbors[e, SELF + 9 * (x >> 3) + 3 * (y >> 3) + (z >> 3)]
+                f = beside_texel(tables, e, t, SELF + 9 * (x >> 3) + 3 * (y >> 3) + (z >> 3))
                 u = ((x & 7) << 6) + ((y & 7) << 3) + (z & 7)
                 if f < 0 or slots[f] == ABSENT or not needed(tables.masks, f, u):
                     continue
@@ -79,6 +80,7 @@ def smudged(
             r, g, b, a, found = stored_value(
                 heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind,
                 np.int64(level), x, y, z, np.float64(nx), np.float64(ny), np.float64(nz),
+                part_bit(tables.texel_parts, code),
             )  # fmt: skip
             own = read_texel(kind, slots[e], pool, tiles, t)
             share = opacity * coverage[rows[i], t] if found else F0

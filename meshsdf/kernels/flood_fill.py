@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 
 from .octree_tables import SELF
+from .texel_neighbors import beside_texel, texel_code
 
 
 @njit(cache=True, nogil=True)
@@ -46,7 +47,7 @@ def flood(tables, first_entry, entry, texel, colors, tolerance, bits, queue):
     ``tolerance`` in every number.
     """
     offset = tables.texel_first[first_entry]
-    start = _index(tables.texel_first, tables.masks, entry, texel) - offset
+    start = texel_code(tables.texel_first, tables.masks, entry, texel) - offset
     bits[entry - first_entry, texel >> 6] |= np.uint64(1) << np.uint64(texel & 63)
     queue[0] = 512 * np.int64(entry) + texel
     n, at = 1, 0
@@ -58,14 +59,14 @@ def flood(tables, first_entry, entry, texel, colors, tolerance, bits, queue):
             x = (t >> 6) + (step if axis == 0 else 0)
             y = ((t >> 3) & 7) + (step if axis == 1 else 0)
             z = (t & 7) + (step if axis == 2 else 0)
-            f = np.int64(tables.neighbors[e, SELF + 9 * (x >> 3) + 3 * (y >> 3) + (z >> 3)])
+            f = beside_texel(tables, e, t, SELF + 9 * (x >> 3) + 3 * (y >> 3) + (z >> 3))
             if f < 0:
                 continue
             u = ((x & 7) << 6) + ((y & 7) << 3) + (z & 7)
             bit = np.uint64(1) << np.uint64(u & 63)
             if not tables.masks[f, u >> 6] & bit or bits[f - first_entry, u >> 6] & bit:
                 continue
-            other = _index(tables.texel_first, tables.masks, f, u) - offset
+            other = texel_code(tables.texel_first, tables.masks, f, u) - offset
             like = True
             for c in range(4):
                 like &= abs(colors[other, c] - colors[start, c]) <= tolerance
@@ -74,23 +75,3 @@ def flood(tables, first_entry, entry, texel, colors, tolerance, bits, queue):
                 queue[n] = 512 * f + u
                 n += 1
     return n
-
-
-@njit(cache=True, nogil=True)
-def _index(first, masks, e, t):
-    """Which of all texels the texel t of an entry is."""
-    at = first[e]
-    for word in range(t >> 6):
-        at += _count(masks[e, word])
-    return at + _count(masks[e, t >> 6] & ((np.uint64(1) << np.uint64(t & 63)) - np.uint64(1)))
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _count(word):
-    """How many bits of a word are set (in parallel, by ever larger parts of it)."""
-    word -= (word >> np.uint64(1)) & np.uint64(0x5555555555555555)
-    word = (word & np.uint64(0x3333333333333333)) + (
-        (word >> np.uint64(2)) & np.uint64(0x3333333333333333)
-    )
-    word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
-    return np.int64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))

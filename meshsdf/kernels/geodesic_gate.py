@@ -12,6 +12,7 @@ from numba import njit
 from .brush_reach import BATCH, MARGIN, PLACE, segment_distance2
 from .octree_tables import SELF
 from .sheets import decode_normal
+from .texel_neighbors import beside_texel, is_beside, parts_beside
 from .texture_lookup import needed
 
 # A point of the surface is in a cut cell, whose corners are at most its diagonal away
@@ -20,25 +21,31 @@ HALF_DIAGONAL = 3.5 * math.sqrt(3.0)
 
 
 @njit(cache=True, nogil=True)
-def connected_texels(tables, found, n, batch, marks, finest, wanted, dabs, begin, end, gates):
+def connected_texels(
+    tables, found, n, batch, marks, finest, wanted, dabs, parts, begin, end, gates
+):
     """``gates[d, i]`` (8,) uint64 = texels of ``found[i]`` connected to dab d, begin <= d < end.
 
-    At each level the flood starts from the texels around the dab's ends that look its way; where
-    there are none, from the nearest one.
+    At each level the flood starts from the texels around the dab's ends that look its way and,
+    where sheets are divided, are of its ``parts`` (bits); where there are none, from the nearest.
     """
     queue = np.empty(512 * n, np.int64)
     for d in range(begin, end):
         gates[d, :n, :] = np.uint64(0)
         for level in range(finest, wanted + 1):
-            n_queued = _seeds(tables, found, n, level, dabs[d], SEED_DISTANCE2, gates[d], queue)
+            n_queued = _seeds(
+                tables, found, n, level, dabs[d], parts[d], SEED_DISTANCE2, gates[d], queue
+            )
             if n_queued == 0:
-                nearest = _nearest(tables, found, n, level, dabs[d])
-                n_queued = _seeds(tables, found, n, level, dabs[d], nearest, gates[d], queue)
+                nearest = _nearest(tables, found, n, level, dabs[d], parts[d])
+                n_queued = _seeds(
+                    tables, found, n, level, dabs[d], parts[d], nearest, gates[d], queue
+                )
             _flood(tables, found, batch, marks, dabs, d, gates[d], queue, n_queued)
 
 
 @njit(cache=True, nogil=True)
-def _seeds(tables, found, n, level, dab, most2, gate, queue):
+def _seeds(tables, found, n, level, dab, parts, most2, gate, queue):
     """Mark and queue the texels of a level within a distance of the dab's ends."""
     n_queued = 0
     shrink = 1.0 / (1 << level)
@@ -46,6 +53,8 @@ def _seeds(tables, found, n, level, dab, most2, gate, queue):
     for i in range(n):
         e = found[i]
         if tables.levels[e] != level:
+            continue
+        if is_beside(tables, e, parts_beside(tables, e), parts):
             continue
         x, y, z = 8.0 * tables.bricks[e, 0], 8.0 * tables.bricks[e, 1], 8.0 * tables.bricks[e, 2]
         if _to_end2(dab, shrink, x + 3.5, y + 3.5, z + 3.5) > reach * reach:
@@ -64,7 +73,7 @@ def _seeds(tables, found, n, level, dab, most2, gate, queue):
 
 
 @njit(cache=True, nogil=True)
-def _nearest(tables, found, n, level, dab):
+def _nearest(tables, found, n, level, dab, parts):
     """Squared distance to the dab's ends of the nearest texel that looks its way; -1 if none."""
     best = 4.0 * max(dab[6], dab[7]) ** 2 + 4.0
     any_found = False
@@ -72,6 +81,8 @@ def _nearest(tables, found, n, level, dab):
     for i in range(n):
         e = found[i]
         if tables.levels[e] != level:
+            continue
+        if is_beside(tables, e, parts_beside(tables, e), parts):
             continue
         x, y, z = 8.0 * tables.bricks[e, 0], 8.0 * tables.bricks[e, 1], 8.0 * tables.bricks[e, 2]
         code = tables.texel_first[e]
@@ -109,7 +120,7 @@ def _flood(tables, found, batch, marks, dabs, d, gate, queue, n_queued):
     while at < n_queued:
         i, t = queue[at] >> 9, queue[at] & 511
         at += 1
-        e = found[i]
+        e = np.int64(found[i])
         shrink = 1.0 / (1 << tables.levels[e])
         reach = max(dabs[d, 6], dabs[d, 7]) * shrink + MARGIN
         for side in range(6):
@@ -117,9 +128,9 @@ def _flood(tables, found, batch, marks, dabs, d, gate, queue, n_queued):
             x = (t >> 6) + (step if axis == 0 else 0)
             y = ((t >> 3) & 7) + (step if axis == 1 else 0)
             z = (t & 7) + (step if axis == 2 else 0)
-            f, j = np.int32(e), i
+            f, j = e, i
             if (x | y | z) & ~7:
-                f = tables.neighbors[e, SELF + 9 * (x >> 3) + 3 * (y >> 3) + (z >> 3)]
+                f = beside_texel(tables, e, t, SELF + 9 * (x >> 3) + 3 * (y >> 3) + (z >> 3))
                 if f < 0 or marks[f, BATCH] != batch:
                     continue
                 j = np.int64(marks[f, PLACE])

@@ -8,7 +8,14 @@ so that what is shown depends on no texel but those it is made of.
 import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet, sheets_of
+from .octree_tables import (
+    FIRST_GROUP,
+    NO_ENTRY,
+    find_code,
+    nearest_sheet,
+    part_bit,
+    sheets_of,
+)
 from .sheets import decode_normal
 from .texel_codes import F0, F1, decode
 from .texture_lookup import (
@@ -54,7 +61,7 @@ def layer_values(tables, slots, own, pool, tiles, kind, entries, first, out):
                 r, g, b, a = _node_value(
                     heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind,
                     above, x + (t >> 6), y + ((t >> 3) & 7), z + (t & 7), np.float64(nx),
-                    np.float64(ny), np.float64(nz),
+                    np.float64(ny), np.float64(nz), part_bit(tables.texel_parts, code),
                 )  # fmt: skip
             out[at, 0], out[at, 1], out[at, 2], out[at, 3] = r, g, b, a
             at += 1
@@ -110,9 +117,10 @@ def tile_above(tables, slots, e):
 @njit(cache=True, nogil=True)
 def _node_value(
     heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level, x, y, z, nx,
-    ny, nz,
+    ny, nz, part,
 ):  # fmt: skip
-    """r, g, b, a: F_level at node (x, y, z) of the level below it, on the sheet that looks along n.
+    """r, g, b, a: F_level at node (x, y, z) of the level below it, on the sheet of the part that
+    looks along n.
 
     A corner that exists and is not stored counts with what is stored above it.
     """
@@ -123,7 +131,7 @@ def _node_value(
         ox, oy, oz = x - (i << below), y - (j << below), z - (k << below)
         base = find_code(heads, pages, level, i >> 3, j >> 3, k >> 3)
         if base < NO_ENTRY:
-            base = nearest_sheet(groups, sheets, base, nx, ny, nz)
+            base = nearest_sheet(groups, sheets, base, nx, ny, nz, part)
         # Most cells lie within one brick that has all their corners
         stored, absent = 0, 0
         slot = slots[base] if base >= 0 else np.int32(ABSENT)
@@ -136,7 +144,7 @@ def _node_value(
                 continue
             e = corner_of_cell(
                 heads, pages, groups, sheets, neighbors, level, base, i, j, k, cx, cy, cz, nx, ny,
-                nz,
+                nz, part,
             )  # fmt: skip
             if e >= 0 and needed(masks, e, texel_index(i + cx, j + cy, k + cz)):
                 if slots[e] == ABSENT:
@@ -163,7 +171,7 @@ def _node_value(
             elif (stored >> c) & 1:
                 e = corner_of_cell(
                     heads, pages, groups, sheets, neighbors, level, base, i, j, k, cx, cy, cz, nx,
-                    ny, nz,
+                    ny, nz, part,
                 )  # fmt: skip
                 t = texel_index(i + cx, j + cy, k + cz)
                 r, g, b, a = read_texel(kind, slots[e], pool, tiles, t)
@@ -171,6 +179,7 @@ def _node_value(
                 r, g, b, a, found = stored_value(
                     heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind,
                     level + 1, 0.5 * (i + cx), 0.5 * (j + cy), 0.5 * (k + cz), nx, ny, nz,
+                    part,
                 )  # fmt: skip
                 if not found:
                     continue
@@ -207,7 +216,7 @@ def _corners_within(masks, e, x, y, z, ox, oy, oz):
 
 @njit(cache=True, nogil=True, inline="always")
 def corner_of_cell(
-    heads, pages, groups, sheets, neighbors, level, base, i, j, k, cx, cy, cz, nx, ny, nz
+    heads, pages, groups, sheets, neighbors, level, base, i, j, k, cx, cy, cz, nx, ny, nz, part
 ):
     """Entry of the brick that holds a corner of cell (i, j, k), or NO_ENTRY."""
     dx, dy, dz = ((i & 7) + cx) >> 3, ((j & 7) + cy) >> 3, ((k & 7) + cz) >> 3
@@ -215,7 +224,7 @@ def corner_of_cell(
         return np.int32(base)
     return corner_entry(
         heads, pages, groups, sheets, neighbors, level, base, i >> 3, j >> 3, k >> 3, dx, dy, dz,
-        nx, ny, nz,
+        nx, ny, nz, part,
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from .node_values import MIXED, corner_of_cell, texel_index, tile_above
-from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, find_entry, sheets_of
+from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, find_entry, part_bit, sheets_of
 from .sheets import decode_normal
 from .texel_codes import decode
 from .texture_lookup import ABSENT, FIRST_TILE, needed
@@ -208,7 +208,7 @@ def _sheet_at(tables, level, nodes, facing):
     """The entry around the least corner of a box of nodes that looks along ``facing``."""
     return find_entry(
         tables.heads, tables.pages, tables.groups, tables.sheets, level, nodes[0] >> 3,
-        nodes[1] >> 3, nodes[2] >> 3, facing[0], facing[1], facing[2],
+        nodes[1] >> 3, nodes[2] >> 3, facing[0], facing[1], facing[2], facing[3],
     )  # fmt: skip
 
 
@@ -224,7 +224,7 @@ def _node_in_box(tables, level, base, nodes, facing, c):
     e = np.int64(
         corner_of_cell(
             tables.heads, tables.pages, tables.groups, tables.sheets, tables.neighbors, level,
-            base, i, j, k, cx, cy, cz, facing[0], facing[1], facing[2],
+            base, i, j, k, cx, cy, cz, facing[0], facing[1], facing[2], facing[3],
         )
     )  # fmt: skip
     if e < 0 or not needed(tables.masks, e, t):
@@ -234,9 +234,10 @@ def _node_in_box(tables, level, base, nodes, facing, c):
 
 @njit(cache=True, nogil=True, inline="always")
 def _facing(tables, code):
-    """The normal of a texel."""
+    """The normal of a texel, and its part."""
     nx, ny, nz = decode_normal(tables.texel_normals[code, 0], tables.texel_normals[code, 1])
-    return np.float64(nx), np.float64(ny), np.float64(nz)
+    part = part_bit(tables.texel_parts, code)
+    return np.float64(nx), np.float64(ny), np.float64(nz), part
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -331,7 +332,8 @@ def _is_made_of_changed(tables, slots, row_of, bits, level, nodes, corner, facin
 @njit(cache=True, nogil=True)
 def _around(tables, slots, row_of, bits, level, nodes, facing):
     """Of a box of at most 8 nodes: whether any is changed, whether any is stored, and which exist
-    and are not (bits, x first); on the sheet that looks along ``facing``."""
+    and are not (bits, x first); on the sheet of the part and the way of
+    ``facing``."""
     base = _sheet_at(tables, level, nodes, facing)
     stored, missing = False, 0
     for c in range(8):

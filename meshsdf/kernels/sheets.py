@@ -33,18 +33,20 @@ def find_sheets(
     for i in range(begin, end):
         marked[:] = False
         sums[:] = 0.0
-        two = _poles(normals, faces, first[i], first[i + 1], pole)
+        two = find_poles(normals, faces, first[i], first[i + 1], pole)
         for s in range(first[i], first[i + 1]):
             face = faces[s]
             sheet = 0
-            if two and _dot(normals, face, pole, 1) > _dot(normals, face, pole, 0):
+            if two and cosine_to_pole(normals, face, pole, 1) > cosine_to_pole(
+                normals, face, pole, 0
+            ):
                 sheet = 1
             for corner in range(3):
                 for axis in range(3):
                     local[corner, axis] = (
                         triangles[face, corner, axis] * scale - 8.0 * bricks[i, axis]
                     )
-            _mark(local, normals, face, marked[sheet], sums[sheet])
+            mark_texels(local, normals, face, marked[sheet], sums[sheet])
         if two and not _opposed(marked, sums):
             for t in range(512):
                 marked[0, t] |= marked[1, t]
@@ -54,14 +56,14 @@ def find_sheets(
             two = False
         n_sheets[i] = 2 if two else 1
         for sheet in range(2):
-            _pack(marked[sheet], masks[i, sheet])
-            _mean(sums[sheet], means[i, sheet])
+            pack_bits(marked[sheet], masks[i, sheet])
+            mean_normal(sums[sheet], means[i, sheet])
             for t in range(512):
                 encode_normal(sums[sheet, t], texels[i - begin, sheet, t])
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _dot(normals, face, pole, sheet):
+def cosine_to_pole(normals, face, pole, sheet):
     return (
         normals[face, 0] * pole[sheet, 0]
         + normals[face, 1] * pole[sheet, 1]
@@ -70,7 +72,7 @@ def _dot(normals, face, pole, sheet):
 
 
 @njit(cache=True, nogil=True)
-def _poles(normals, faces, start, stop, pole):
+def find_poles(normals, faces, start, stop, pole):
     """Two opposed normals, each the mean of those nearer to it; False if none look apart."""
     if _within_cone(normals, faces, start, stop, pole):
         return False
@@ -84,7 +86,7 @@ def _poles(normals, faces, start, stop, pole):
         along = _extreme(normals, faces, start, stop, pole, 1.0)
         pole[0] = normals[along]
         away = _extreme(normals, faces, start, stop, pole, -1.0)
-        d = _dot(normals, away, pole, 0)
+        d = cosine_to_pole(normals, away, pole, 0)
         if d < apart:
             first, second, apart = along, away, d
     if apart >= 0.0:
@@ -92,7 +94,12 @@ def _poles(normals, faces, start, stop, pole):
     pole[0], pole[1] = normals[first], normals[second]
     total = np.zeros((2, 3))
     for s in range(start, stop):
-        sheet = 1 if _dot(normals, faces[s], pole, 1) > _dot(normals, faces[s], pole, 0) else 0
+        sheet = (
+            1
+            if cosine_to_pole(normals, faces[s], pole, 1)
+            > cosine_to_pole(normals, faces[s], pole, 0)
+            else 0
+        )
         for axis in range(3):
             total[sheet, axis] += normals[faces[s], axis]
     for sheet in range(2):
@@ -113,7 +120,7 @@ def _within_cone(normals, faces, start, stop, pole):
     length = math.sqrt(pole[0, 0] ** 2 + pole[0, 1] ** 2 + pole[0, 2] ** 2)
     least = 4.0
     for s in range(start, stop):
-        least = min(least, _dot(normals, faces[s], pole, 0))
+        least = min(least, cosine_to_pole(normals, faces[s], pole, 0))
     return least > 0.7072 * length
 
 
@@ -122,15 +129,15 @@ def _extreme(normals, faces, start, stop, pole, sign):
     """The first face whose normal is furthest along (sign 1) or against (-1) ``pole[0]``."""
     found, most = faces[start], -4.0
     for s in range(start, stop):
-        d = sign * _dot(normals, faces[s], pole, 0)
+        d = sign * cosine_to_pole(normals, faces[s], pole, 0)
         if d > most:
             found, most = faces[s], d
     return found
 
 
 @njit(cache=True, nogil=True)
-def _mark(local, normals, face, marked, sums):
-    """Mark the corners in the brick of every cell that the triangle touches."""
+def mark_texels(local, normals, face, marked, sums):
+    """Mark the corners in the brick of every cell that the triangle touches, and add its normal."""
     low = np.empty(3, np.int64)
     high = np.empty(3, np.int64)
     for axis in range(3):
@@ -168,7 +175,7 @@ def _opposed(marked, sums):
 
 
 @njit(cache=True, nogil=True)
-def _pack(marked, mask):
+def pack_bits(marked, mask):
     for i in range(8):
         word = np.uint64(0)
         for bit in range(64):
@@ -178,7 +185,7 @@ def _pack(marked, mask):
 
 
 @njit(cache=True, nogil=True)
-def _mean(sums, mean):
+def mean_normal(sums, mean):
     x, y, z = 0.0, 0.0, 0.0
     for t in range(512):
         x += sums[t, 0]

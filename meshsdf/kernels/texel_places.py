@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 
+from .octree_tables import part_bit
 from .sheets import decode_normal
 from .texel_codes import encode
 
@@ -27,6 +28,15 @@ def texel_places(tables, entries, first, begin, end, points, normals):
             normals[at, 0], normals[at, 1], normals[at, 2] = nx, ny, nz
             at += 1
             code += 1
+
+
+@njit(cache=True, nogil=True)
+def texel_bits(tables, entries, first, parts):
+    """``parts`` = the parts, as bits, of the texels of entries, in the order of `texel_places`."""
+    for i in range(len(entries)):
+        code = tables.texel_first[entries[i]]
+        for n in range(first[i + 1] - first[i]):
+            parts[first[i] + n] = part_bit(tables.texel_parts, code + n)
 
 
 @njit(cache=True, nogil=True)

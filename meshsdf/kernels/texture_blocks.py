@@ -25,12 +25,12 @@ ROW, PAIR, COLUMN = np.uint64(0x303), np.uint64(0x3), np.uint64(0x101)
 @njit(cache=True, nogil=True)
 def block_values(
     heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, count, levels, places,
-    normals, numbers, between, out,
+    normals, parts, numbers, between, out,
 ):  # fmt: skip
     """``out[q]`` (count, 4) = F_levels[q] at ``places[q]``, in nodes of that level.
 
-    ``normals`` (count, 3). Scratch: numbers (BLOCK, COLUMNS) int64, between (BLOCK, 3) float32.
-    Levels and places may change to those of the coarser level that answers.
+    ``normals`` (count, 3), ``parts`` (count,). Scratch: numbers (BLOCK, COLUMNS) int64, between
+    (BLOCK, 3) float32. Levels and places may change to those of the coarser level that answers.
     """
     n_plain = n_across = n_other = 0
     code, at_level, at_x, at_y, at_z = np.int32(-1), np.int64(-1), 0, 0, 0
@@ -46,7 +46,7 @@ def block_values(
             base = code
             if base < -1:
                 base = nearest_sheet(
-                    groups, sheets, base, normals[q, 0], normals[q, 1], normals[q, 2]
+                    groups, sheets, base, normals[q, 0], normals[q, 1], normals[q, 2], parts[q]
                 )
             slot = np.int32(ABSENT)
             if base >= 0:
@@ -78,6 +78,7 @@ def block_values(
         out[q, 0], out[q, 1], out[q, 2], out[q, 3] = level_value(
             heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, levels[q],
             places[q, 0], places[q, 1], places[q, 2], normals[q, 0], normals[q, 1], normals[q, 2],
+            parts[q],
         )  # fmt: skip
 
 

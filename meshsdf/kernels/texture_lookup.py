@@ -38,26 +38,26 @@ def needed(masks, entry, t):
 
 @njit(cache=True, nogil=True, inline="always")
 def corner_entry(
-    heads, pages, groups, sheets, neighbors, level, base, bx, by, bz, dx, dy, dz, nx, ny, nz
+    heads, pages, groups, sheets, neighbors, level, base, bx, by, bz, dx, dy, dz, nx, ny, nz, part
 ):
     """Entry of the brick (dx, dy, dz) further than the one of entry ``base``, which may be none."""
     if base < 0:
         return find_entry(
-            heads, pages, groups, sheets, level, bx + dx, by + dy, bz + dz, nx, ny, nz
+            heads, pages, groups, sheets, level, bx + dx, by + dy, bz + dz, nx, ny, nz, part
         )
     entry = neighbors[base, SELF + 9 * dx + 3 * dy + dz]
     if entry <= FIRST_GROUP:
-        # One sheet here and several there: the point's side decides, if it is known
+        # One sheet here and several there: the point's side and part decide, as far as known
         if nx == 0.0 and ny == 0.0 and nz == 0.0:
             nx, ny, nz = sheets[base, 0], sheets[base, 1], sheets[base, 2]
-        entry = nearest_sheet(groups, sheets, entry, nx, ny, nz)
+        entry = nearest_sheet(groups, sheets, entry, nx, ny, nz, part)
     return entry
 
 
 @njit(cache=True, nogil=True)
 def stored_value(
     heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level, x, y, z, nx,
-    ny, nz,
+    ny, nz, part,
 ):  # fmt: skip
     """r, g, b, a, found: the blend of the stored corners around (x, y, z), nodes of the level.
 
@@ -68,7 +68,7 @@ def stored_value(
         i, j, k = math.floor(x), math.floor(y), math.floor(z)
         fx, fy, fz = np.float32(x - i), np.float32(y - j), np.float32(z - k)
         bx, by, bz = i >> 3, j >> 3, k >> 3
-        base = find_entry(heads, pages, groups, sheets, level, bx, by, bz, nx, ny, nz)
+        base = find_entry(heads, pages, groups, sheets, level, bx, by, bz, nx, ny, nz, part)
         sr, sg, sb, sa, sw = F0, F0, F0, F0, F0
         same, first = True, True
         r0, g0, b0, a0 = F0, F0, F0, F0
@@ -80,7 +80,7 @@ def stored_value(
             ox, oy, oz = (i & 7) + cx, (j & 7) + cy, (k & 7) + cz
             e = corner_entry(
                 heads, pages, groups, sheets, neighbors, level, base, bx, by, bz, ox >> 3, oy >>
-                3, oz >> 3, nx, ny, nz,
+                3, oz >> 3, nx, ny, nz, part,
             )  # fmt: skip
             if e < 0:
                 continue
@@ -114,9 +114,10 @@ def stored_value(
 @njit(cache=True, nogil=True, forceinline=True)
 def level_value(
     heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level, x, y, z, nx,
-    ny, nz,
+    ny, nz, part,
 ):  # fmt: skip
-    """r, g, b, a: F_level at (x, y, z), in nodes of the level, on the sheet that looks along n."""
+    """r, g, b, a: F_level at (x, y, z), in nodes of the level, on the sheet of the part that looks
+    along n."""
     top = len(heads)
     while level < top:
         i, j, k = math.floor(x), math.floor(y), math.floor(z)
@@ -124,7 +125,7 @@ def level_value(
         tx, ty, tz = i & 7, j & 7, k & 7
         base = find_code(heads, pages, level, bx, by, bz)
         if base < -1:
-            base = nearest_sheet(groups, sheets, base, nx, ny, nz)
+            base = nearest_sheet(groups, sheets, base, nx, ny, nz, part)
         if tx < 7 and ty < 7 and tz < 7:
             slot = np.int32(ABSENT)
             if base >= 0:
@@ -167,7 +168,7 @@ def level_value(
                 )  # fmt: skip
         r, g, b, a, found = _blend_across(
             heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level, base,
-            x, y, z, nx, ny, nz,
+            x, y, z, nx, ny, nz, part,
         )  # fmt: skip
         if found:
             return r, g, b, a
@@ -247,7 +248,7 @@ def _texel_index(x, y, z):
 @njit(cache=True, nogil=True)
 def _blend_across(
     heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level, base, x, y,
-    z, nx, ny, nz,
+    z, nx, ny, nz, part,
 ):  # fmt: skip
     """F_level in a cell that bricks share, or where corners do not exist; found is False if no
     corner is stored. Where all eight exist, the sums are those of `blend`, bit by bit."""
@@ -259,7 +260,7 @@ def _blend_across(
         ox, oy, oz = (i & 7) + (c >> 2), (j & 7) + ((c >> 1) & 1), (k & 7) + (c & 1)
         e = corner_entry(
             heads, pages, groups, sheets, neighbors, level, base, bx, by, bz, ox >> 3, oy >> 3, oz
-            >> 3, nx, ny, nz,
+            >> 3, nx, ny, nz, part,
         )  # fmt: skip
         if e >= 0 and needed(masks, e, _texel_index(ox, oy, oz)):
             if slots[e] == ABSENT:
@@ -280,13 +281,13 @@ def _blend_across(
             ox, oy, oz = (i & 7) + cx, (j & 7) + cy, (k & 7) + cz
             e = corner_entry(
                 heads, pages, groups, sheets, neighbors, level, base, bx, by, bz, ox >> 3, oy >>
-                3, oz >> 3, nx, ny, nz,
+                3, oz >> 3, nx, ny, nz, part,
             )  # fmt: skip
             r, g, b, a = read_texel(kind, slots[e], pool, tiles, _texel_index(ox, oy, oz))
         else:
             r, g, b, a, found = stored_value(
                 heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level +
-                1, 0.5 * (i + cx), 0.5 * (j + cy), 0.5 * (k + cz), nx, ny, nz,
+                1, 0.5 * (i + cx), 0.5 * (j + cy), 0.5 * (k + cz), nx, ny, nz, part,
             )  # fmt: skip
             if not found:
                 continue

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet, sheets_of
+from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet, part_bit, sheets_of
 from .sheets import MAX_SHEETS, decode_normal
 from .texel_codes import decode, encode
 from .texture_lookup import ABSENT, FIRST_TILE, needed
@@ -12,7 +12,6 @@ UNCHANGED, CHANGED = 0, 1
 MISSING, UNSTORED, STORED, ASIDE = 0, 1, 2, 4  # the last: looks another way than the sheet
 SIDE = 17  # texels along an axis that the 8 of a brick are means of
 AROUND = SIDE**3
-PARENTS = 8 * MAX_SHEETS
 
 
 @njit(cache=True, nogil=True)
@@ -24,9 +23,10 @@ def mip_texels(tables, entries, slots, pool, tiles, kind, begin, end, texels, st
     texel keeps its number where some of these are not stored. ``state[i]`` is CHANGED or not.
     """
     codes = np.empty(27, np.int32)
-    around = np.empty((MAX_SHEETS, AROUND, 4), np.float32)
-    words = np.empty((MAX_SHEETS, AROUND), pool.dtype)
-    states = np.empty((MAX_SHEETS, AROUND), np.uint8)
+    most = most_sheets(tables.groups)
+    around = np.empty((most, AROUND, 4), np.float32)
+    words = np.empty((most, AROUND), pool.dtype)
+    states = np.empty((most, AROUND), np.uint8)
     for i in range(begin, end):
         e = entries[i]
         slot = slots[e]
@@ -60,11 +60,20 @@ def mip_texels(tables, entries, slots, pool, tiles, kind, begin, end, texels, st
 
 
 @njit(cache=True, nogil=True)
+def most_sheets(groups):
+    """The most sheets that a brick has, but at least two."""
+    most = MAX_SHEETS
+    for g in range(len(groups)):
+        most = max(most, groups[g, 1])
+    return most
+
+
+@njit(cache=True, nogil=True)
 def parents_of(tables, entries, parents):
-    """``parents[i]`` (16,) = the entries one level up that have means of texels of ``entries[i]``.
+    """``parents[i]`` (16,), or more, = the entries one level up with means of texels of an entry.
 
     Texels 8 b ... 8 b + 7 along an axis count in 4 b ... 4 b + 4 of the level above: in one or two
-    bricks, of two sheets at most. NO_ENTRY fills the row where there are fewer.
+    bricks, of at most `most_sheets`. NO_ENTRY fills the row where there are fewer.
     """
     for i in range(len(entries)):
         e = entries[i]
@@ -213,13 +222,15 @@ def _word(kind, sr, sg, sb, sa, sw):
 
 @njit(cache=True, nogil=True)
 def _looks_along(tables, sheet, group, e, t):
-    """Whether texel t of entry e looks the way of ``sheet`` more than of its ``group``'s others."""
+    """Whether texel t of entry e is of the parts of ``sheet``, and looks its way more than that of
+    others of its ``group``."""
     at = tables.texel_first[e]
     for word in range(t >> 6):
         at += _bits(tables.masks[e, word])
     at += _bits(tables.masks[e, t >> 6] & ((np.uint64(1) << np.uint64(t & 63)) - np.uint64(1)))
     nx, ny, nz = decode_normal(tables.texel_normals[at, 0], tables.texel_normals[at, 1])
-    return nearest_sheet(tables.groups, tables.sheets, group, nx, ny, nz) == sheet
+    part = part_bit(tables.texel_parts, at)
+    return nearest_sheet(tables.groups, tables.sheets, group, nx, ny, nz, part) == sheet
 
 
 @njit(cache=True, nogil=True, inline="always")

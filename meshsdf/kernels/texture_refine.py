@@ -6,12 +6,12 @@ from numba import njit
 from .octree_tables import NO_ENTRY, find_code, sheets_of
 from .texture_lookup import FIRST_TILE
 
-FAMILY = 54  # at most two sheets in each of 27 bricks
+FAMILY = 54  # two sheets in each of 27 bricks, the most unless sheets are divided
 
 
 @njit(cache=True, nogil=True)
 def parents_around(tables, entries, begin, end, family):
-    """``family[i]`` (54,) = all sheets of the 27 bricks around the parent of ``entries[i]``.
+    """``family[i]`` (54,), or so, = all sheets of the 27 bricks around the parent of an entry.
 
     NO_ENTRY fills the row where there are fewer.
     """

@@ -12,16 +12,17 @@ from .texture_lookup import ABSENT, needed, read_texel
 
 
 @njit(cache=True, nogil=True)
-def sample(tables, slots, pool, tiles, kind, points, normals, footprints, begin, end, out):
+def sample(tables, slots, pool, tiles, kind, points, normals, parts, footprints, begin, end, out):
     """``out[n]`` (n, 4) float32 = the texture at ``points[n]`` for ``begin <= n < end``.
 
-    ``normals`` and ``footprints`` hold one row per point, or one for all. What a footprint of f
-    texels shows lies between the levels log2 f. Points that are not finite give NaN.
+    ``normals``, ``parts`` and ``footprints`` hold one row per point, or one for all. What a
+    footprint of f texels shows lies between the levels log2 f. Points that are not finite give NaN.
     """
     heads, pages, groups, sheets = tables.heads, tables.pages, tables.groups, tables.sheets
     neighbors, masks = tables.neighbors, tables.masks
     top, scale = len(heads) - 1, 1.0 / tables.texel
     levels, places, facing = np.empty(BLOCK, np.int64), np.empty((BLOCK, 3)), np.empty((BLOCK, 3))
+    wanted = np.empty(BLOCK, np.int64)
     colors, shares = np.empty((BLOCK, 4), np.float32), np.empty(BLOCK, np.float32)
     targets, numbers = np.empty(BLOCK, np.int64), np.empty((BLOCK, COLUMNS), np.int64)
     fractions = np.empty((BLOCK, 3), np.float32)
@@ -31,26 +32,27 @@ def sample(tables, slots, pool, tiles, kind, points, normals, footprints, begin,
         at = begin
         while at < end:
             count, at = _gather(
-                points, normals, footprints, scale, top, at, end, coarser, targets, levels, shares,
-                places, facing, out,
+                points, normals, parts, footprints, scale, top, at, end, coarser, targets, levels,
+                shares, places, facing, wanted, out,
             )  # fmt: skip
             block_values(
                 heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, count,
-                levels, places, facing, numbers, fractions, colors,
+                levels, places, facing, wanted, numbers, fractions, colors,
             )  # fmt: skip
             _scatter(colors, targets, shares, count, coarser, out)
 
 
 @njit(cache=True, nogil=True)
 def _gather(
-    points, normals, footprints, scale, top, at, end, coarser, targets, levels, shares, places,
-    facing, out,
+    points, normals, parts, footprints, scale, top, at, end, coarser, targets, levels, shares,
+    places, facing, wanted, out,
 ):  # fmt: skip
     """Fill a block with points from ``at`` on; how many, and the first that did not fit.
 
     In the coarser turn only those that lie between levels.
     """
     every_normal, every_footprint = int(len(normals) > 1), int(len(footprints) > 1)
+    every_part = int(len(parts) > 1)
     count = 0
     while at < end and count < len(targets):
         n = at
@@ -75,6 +77,7 @@ def _gather(
         m = n * every_normal
         facing[count, 0], facing[count, 1] = normals[m, 0], normals[m, 1]
         facing[count, 2] = normals[m, 2]
+        wanted[count] = parts[n * every_part]
         count += 1
     return count, at
 
@@ -99,7 +102,7 @@ def _scatter(colors, targets, shares, count, coarser, out):
 
 
 @njit(cache=True, nogil=True)
-def nearest(tables, slots, pool, tiles, kind, points, normals, begin, end, out):
+def nearest(tables, slots, pool, tiles, kind, points, normals, parts, begin, end, out):
     """``out[n]`` = the nearest stored texel's numbers, at the finest level stored there.
 
     Block by block: where texels are, then to fetch them, then what they mean. A loop that only
@@ -107,7 +110,7 @@ def nearest(tables, slots, pool, tiles, kind, points, normals, begin, end, out):
     """
     places, texels = np.empty(BLOCK, np.int64), np.empty(BLOCK, pool.dtype)
     texels_of_all = pool.reshape(pool.size)
-    every_normal = int(len(normals) > 1)
+    every_normal, every_part = int(len(normals) > 1), int(len(parts) > 1)
     for first in range(begin, end, BLOCK):
         count = min(BLOCK, end - first)
         _find_texels(tables, slots, points, first, count, places)
@@ -121,7 +124,7 @@ def nearest(tables, slots, pool, tiles, kind, points, normals, begin, end, out):
                 m = n * every_normal
                 r, g, b, a = _nearest_of_levels(
                     tables, slots, pool, tiles, kind, points[n, 0], points[n, 1], points[n, 2],
-                    normals[m, 0], normals[m, 1], normals[m, 2],
+                    normals[m, 0], normals[m, 1], normals[m, 2], parts[n * every_part],
                 )  # fmt: skip
             out[n, 0], out[n, 1], out[n, 2], out[n, 3] = r, g, b, a
 
@@ -148,7 +151,7 @@ def _find_texels(tables, slots, points, first, count, places):
 
 
 @njit(cache=True, nogil=True)
-def _nearest_of_levels(tables, slots, pool, tiles, kind, x, y, z, nx, ny, nz):
+def _nearest_of_levels(tables, slots, pool, tiles, kind, x, y, z, nx, ny, nz, part):
     """r, g, b, a of the nearest texel of the finest level that stores one there."""
     scale = 1.0 / tables.texel
     x, y, z = x * scale, y * scale, z * scale
@@ -159,7 +162,7 @@ def _nearest_of_levels(tables, slots, pool, tiles, kind, x, y, z, nx, ny, nz):
         i, j, k = math.floor(x + 0.5), math.floor(y + 0.5), math.floor(z + 0.5)
         e = find_code(tables.heads, tables.pages, level, i >> 3, j >> 3, k >> 3)
         if e <= FIRST_GROUP:
-            e = nearest_sheet(tables.groups, tables.sheets, e, nx, ny, nz)
+            e = nearest_sheet(tables.groups, tables.sheets, e, nx, ny, nz, part)
         if e >= 0 and slots[e] != ABSENT:
             t = ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)
             if needed(tables.masks, e, t):

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 from .texel_codes import F0, F1, SRGB8
+from .texel_neighbors import entry_parts, texel_part
 from .texture_lookup import read_texel, stored_value
 from .wire_codes import node_code, node_numbers
 from .wire_nodes import (
@@ -73,7 +74,7 @@ def resolve(
 @njit(cache=True, nogil=True)
 def _fill_grid(tables, slots, pool, tiles, kind, picture, e, origin, holders, grid):
     """Put what nodes show in the grid; of those that the sheet lacks only lonely ones."""
-    sheets, masks = tables.sheets, tables.masks
+    sheets, masks, own = tables.sheets, tables.masks, entry_parts(tables, e)
     level = np.int64(tables.levels[e])
     x0, y0, z0 = 8 * tables.bricks[e, 0], 8 * tables.bricks[e, 1], 8 * tables.bricks[e, 2]
     for at in range(NODES):
@@ -89,15 +90,16 @@ def _fill_grid(tables, slots, pool, tiles, kind, picture, e, origin, holders, gr
                 continue
             r, g, b, a = read_texel(kind, slot, pool, tiles, t)
         else:
-            nx, ny, nz = sheets[e, 0], sheets[e, 1], sheets[e, 2]
+            nx, ny, nz, parts = sheets[e, 0], sheets[e, 1], sheets[e, 2], own
             if said == COARSER:
                 nx, ny, nz = texel_normal(masks, tables.texel_first, tables.texel_normals, f, t)
+                parts = texel_part(tables, f, t)
             elif not is_lonely(origin, i, j, k):
                 continue
             r, g, b, a, _ = stored_value(
                 tables.heads, tables.pages, tables.groups, sheets, tables.neighbors, masks, slots,
                 pool, tiles, kind, level + 1, 0.5 * (x0 + i), 0.5 * (y0 + j), 0.5 * (z0 + k),
-                np.float64(nx), np.float64(ny), np.float64(nz),
+                np.float64(nx), np.float64(ny), np.float64(nz), parts,
             )  # fmt: skip
             origin[at] = COARSER
         grid[at] = node_code(picture, r * a, g * a, b * a, a)

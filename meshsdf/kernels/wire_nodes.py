@@ -10,9 +10,18 @@ import math
 import numpy as np
 from numba import njit
 
-from .octree_tables import FIRST_GROUP, NO_ENTRY, SELF, find_code, find_entry, sheets_of
+from .octree_tables import (
+    FIRST_BITS,
+    FIRST_GROUP,
+    NO_ENTRY,
+    SELF,
+    find_code,
+    find_entry,
+    sheets_of,
+)
 from .sheets import decode_normal
 from .texel_codes import F0
+from .texel_neighbors import entry_parts, texel_part
 from .texture_lookup import ABSENT, corner_entry, needed
 
 SIDE = 9
@@ -98,12 +107,14 @@ def _normal_near(masks, sheets, texel_first, texel_normals, e, x, y, z):
 
 
 @njit(cache=True, nogil=True)
-def _node_entry(groups, sheets, neighbors, masks, texel_first, texel_normals, e, x, y, z):
+def _node_entry(
+    groups, sheets, neighbors, masks, texel_first, texel_normals, e, x, y, z, parts
+):  # fmt: skip
     """The entry that holds node (x, y, z), 0 ... 8, of the sheet of entry e, or NO_ENTRY."""
     entry = np.int64(neighbors[e, SELF + 9 * (x >> 3) + 3 * (y >> 3) + (z >> 3)])
     if entry <= FIRST_GROUP:
         # One sheet here and several there: of those that have the node, or of all if none has it,
-        # the one that looks as this one does beside it
+        # the one that looks as this one does beside it; of its parts, if there are any
         nx, ny, nz = _normal_near(masks, sheets, texel_first, texel_normals, e, x, y, z)
         t = ((x & 7) << 6) + ((y & 7) << 3) + (z & 7)
         group = FIRST_GROUP - entry
@@ -113,6 +124,8 @@ def _node_entry(groups, sheets, neighbors, masks, texel_first, texel_normals, e,
             dot = np.float64(sheets[one, 0] * nx + sheets[one, 1] * ny + sheets[one, 2] * nz)
             if not needed(masks, one, t):
                 dot -= 4.0
+            if groups.shape[1] > FIRST_BITS and not groups[group, FIRST_BITS + s] & parts:
+                dot -= 16.0
             if dot > most:
                 entry, most = one, dot
     return entry
@@ -124,7 +137,7 @@ def look_at_nodes(tables, slots, e, wanted, origin, holders):
 
     Returns PRESENT and INCOMPLETE, or 0.
     """
-    masks = tables.masks
+    masks, parts = tables.masks, entry_parts(tables, e)
     here = COARSER if slots[e] == ABSENT else STORED
     found = 0
     for i in range(SIDE):
@@ -143,7 +156,7 @@ def look_at_nodes(tables, slots, e, wanted, origin, holders):
                 elif i == 8 or j == 8 or k == 8:
                     f = _node_entry(
                         tables.groups, tables.sheets, tables.neighbors, masks, tables.texel_first,
-                        tables.texel_normals, e, i, j, k,
+                        tables.texel_normals, e, i, j, k, parts,
                     )  # fmt: skip
                     if f >= 0 and needed(masks, f, ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)):
                         said = COARSER if slots[f] == ABSENT else STORED
@@ -168,40 +181,41 @@ def is_lonely(origin, i, j, k):
 @njit(cache=True, nogil=True)
 def is_deep(tables, slots, e, origin, holders):
     """Whether some node of entry e comes from further up than the level above."""
-    masks, sheets = tables.masks, tables.sheets
+    masks, sheets, own = tables.masks, tables.sheets, entry_parts(tables, e)
     level = np.int64(tables.levels[e]) + 1
     x0, y0, z0 = 8 * tables.bricks[e, 0], 8 * tables.bricks[e, 1], 8 * tables.bricks[e, 2]
     if level + 1 >= len(tables.heads):
         return False
     for at in range(NODES):
         i, j, k = at // 81, at // 9 % 9, at % 9
-        nx, ny, nz = sheets[e, 0], sheets[e, 1], sheets[e, 2]
+        nx, ny, nz, parts = sheets[e, 0], sheets[e, 1], sheets[e, 2], own
         if origin[at] == COARSER:
             t = ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)
             nx, ny, nz = texel_normal(
                 masks, tables.texel_first, tables.texel_normals, holders[at], t
             )
+            parts = texel_part(tables, holders[at], t)
         elif origin[at] != MISSING or not is_lonely(origin, i, j, k):
             continue
-        if not _is_stored_at(tables, slots, level, x0 + i, y0 + j, z0 + k, nx, ny, nz):
+        if not _is_stored_at(tables, slots, level, x0 + i, y0 + j, z0 + k, nx, ny, nz, parts):
             return True
     return False
 
 
 @njit(cache=True, nogil=True)
-def _is_stored_at(tables, slots, level, x, y, z, nx, ny, nz):
+def _is_stored_at(tables, slots, level, x, y, z, nx, ny, nz, parts):
     """Whether ``stored_value`` finds something at this level for a node of the finer one."""
     heads, pages, groups, sheets = tables.heads, tables.pages, tables.groups, tables.sheets
     i, j, k = x >> 1, y >> 1, z >> 1
     bx, by, bz = i >> 3, j >> 3, k >> 3
-    base = find_entry(heads, pages, groups, sheets, level, bx, by, bz, nx, ny, nz)
+    base = find_entry(heads, pages, groups, sheets, level, bx, by, bz, nx, ny, nz, parts)
     for cx in range(1 + (x & 1)):
         for cy in range(1 + (y & 1)):
             for cz in range(1 + (z & 1)):
                 ox, oy, oz = (i & 7) + cx, (j & 7) + cy, (k & 7) + cz
                 f = corner_entry(
                     heads, pages, groups, sheets, tables.neighbors, level, base, bx, by, bz,
-                    ox >> 3, oy >> 3, oz >> 3, nx, ny, nz,
+                    ox >> 3, oy >> 3, oz >> 3, nx, ny, nz, parts,
                 )  # fmt: skip
                 t = ((ox & 7) << 6) + ((oy & 7) << 3) + (oz & 7)
                 if f >= 0 and slots[f] != ABSENT and needed(tables.masks, f, t):

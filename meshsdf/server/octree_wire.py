@@ -40,7 +40,7 @@ def octree_bytes(texture: VolumeTexture) -> bytes:
     arrays = {
         "heads": ("i32", heads),
         "pages": ("i32", tables.pages),
-        "groups": ("i32", tables.groups),
+        "groups": ("i32", tables.groups[:, :2]),
         "sheets": ("i16", _sheet_codes(octree)),
         "parents": ("i32", tables.parents),
         "levels": ("u8", tables.levels),

@@ -63,7 +63,8 @@ class Requests:
             return self.studio.project.seqs.get((client, cseq), 0)
         if isinstance(body, StrokeBegin):
             check_brush_kinds(body.brush)
-            brush = Brush.from_dict(body.brush)
+            # A page shows one of the sheets that texels are divided among
+            brush = Brush.from_dict({"through": True, **body.brush})
             check_brush(brush, self.studio.texture)
             live.begin(client, cseq, body.layer, brush)
         elif isinstance(body, Samples):

@@ -90,6 +90,9 @@ class Brush:
         first, all from the second on.
     geodesic : bool
         Paint only what is connected to the dab's centre within the dab, along the surface.
+    through : bool
+        Where sheets that look the same way lie so close that they need the same texels, and have
+        some of their own for that: paint all of them, not just the dab's own.
     stamp : (h, w) float32, optional
         Picture of a dab, its width the dab's diameter; takes the place of the falloff.
     stencil : Stencil, optional
@@ -136,6 +139,7 @@ class Brush:
     tolerance: Number = 0.05
     end_color: Four = (1.0, 1.0, 1.0, 1.0)
     shape: str = "linear"
+    through: bool = False
 
     def __post_init__(self) -> None:
         for name, least, most in (

@@ -42,11 +42,14 @@ class CloneSource:
         texture, name = self.texture, self.brush.channel
         points, normals = texture.places(entries)
         points = points + np.array(self.brush.offset, np.float64)
+        parts = texture.texel_parts(entries)
         if texture.surface is not None:
-            points, normals = texture.on_surface(points)
+            points, normals, faces = texture.nearest_places(points)
+            parts = texture.octree.parts_of(faces) if texture.knows_parts else None
         colors = look_up(
             texture.octree, self._slots, texture.pool.use(name), texture.tiles.arrays[name],
             texture.channels[name].kind, points, normals, texture.octree.spacing(level),
+            parts=parts,
         )  # fmt: skip
         values = np.zeros((len(entries), 512, 4), np.float32)
         values[texel_mask(texture, entries)] = colors

@@ -39,9 +39,14 @@ class MeshSource:
         points: Points,
         normals: Float64[np.ndarray, "n 3"] | None = None,
         footprint: Number | Values = 0.0,
+        feet: Points | None = None,
     ) -> Numbers:
-        """(n, 4) linear RGB and alpha, averaged over the footprint (world units)."""
-        return self.colors(*self.places(points, normals, footprint), footprint)
+        """(n, 4) linear RGB and alpha, averaged over the footprint (world units).
+
+        ``feet``, if they are given, are asked in place of the points: see `VolumeTexture.feet`.
+        """
+        places = self.places(points if feet is None else feet, normals, footprint)
+        return self.colors(*places, footprint)
 
     def places(
         self,

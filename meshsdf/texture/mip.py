@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import TextureError
 from ..kernels.parallel import even_ranges, run_pieces
 from ..kernels.texture_lookup import ABSENT
-from ..kernels.texture_mip import CHANGED, PARENTS, mip_texels, parents_of
+from ..kernels.texture_mip import CHANGED, mip_texels, most_sheets, parents_of
 from ..progress import Progress, silent
 from .channels import Numbers
 from .layer import Layer
@@ -75,8 +75,9 @@ def _remade(texture: VolumeTexture, layer: Layer, entries: Entries, due: Entries
 
 def parents(texture: VolumeTexture, entries: Entries) -> Entries:
     """The entries one level up that hold means of texels of others, not sorted, some repeatedly."""
-    found = np.empty((len(entries), PARENTS), np.int32)
-    parents_of(texture.octree.tables, entries, found)
+    tables = texture.octree.tables
+    found = np.empty((len(entries), 8 * most_sheets(tables.groups)), np.int32)
+    parents_of(tables, entries, found)
     return found[found >= 0]
 
 
@@ -96,8 +97,11 @@ def bake(
     texture, layer : VolumeTexture, Layer
         What to fill. Levels finer than ``level`` are no longer stored; other channels stay.
     function : callable
-        ``f(points)`` or ``f(points, normals)``, with or without an argument ``footprint`` (the
-        spacing of texels); gives (n, 4): linear colours with alpha, or the channel's values.
+        ``f(points)`` or ``f(points, normals)``, with or without arguments ``footprint`` (the
+        spacing of texels), ``faces`` and ``feet``; gives (n, 4): linear colours with alpha, or the
+        channel's values. The last two are what `VolumeTexture.feet` says: where sheets that look
+        the same way need the same texels, they alone tell which a texel is of; ``feet`` is None
+        where that is nowhere so.
     level : int
         0 is the finest.
     channel : str
@@ -129,25 +133,23 @@ def evaluate(
     """Put what a function says of them into stored entries of one level; no means are made."""
     for begin in range(0, len(entries), ENTRIES_PER_CALL):
         part = entries[begin : begin + ENTRIES_PER_CALL]
-        points, normals = texture.places(part)
-        spacing = texture.octree.spacing(int(texture.octree.tables.levels[part[0]]))
-        values = evaluated(function, points, normals, spacing)
-        texture.put(layer, part, values, channel=channel)
+        texture.put(layer, part, evaluated(function, texture, part), channel=channel)
         texture.collapse_uniform(layer, part)
         progress("bake", min(1.0, (begin + ENTRIES_PER_CALL) / len(entries)))
 
 
-def evaluated(function: Callable[..., Any], points, normals, spacing: float) -> Numbers:
-    """The function's values, checked: (n, 4) float32."""
+def evaluated(function: Callable[..., Any], texture: VolumeTexture, entries: Entries) -> Numbers:
+    """The function's values at the texels of entries of one level, checked: (n, 4) float32."""
+    points, normals = texture.places(entries)
     try:
         arguments = inspect.signature(function).parameters
     except ValueError:
         arguments = {}
-    given: dict[str, Any] = {"footprint": spacing} if "footprint" in arguments else {}
+    given = _asked(arguments, texture, entries)
     positional = [points]
     if "normals" in arguments:
         given["normals"] = normals
-    elif len(arguments) > 1 and "footprint" not in arguments:
+    elif len(arguments) > 1 and not given:
         second = list(arguments.values())[1]
         if second.default is second.empty and second.kind is second.POSITIONAL_OR_KEYWORD:
             positional.append(normals)
@@ -156,6 +158,20 @@ def evaluated(function: Callable[..., Any], points, normals, spacing: float) -> 
         what = f"gave {values.dtype} of the shape {values.shape} for {len(points)} points"
         raise TextureError(f"the function {what}", WHERE, "return (n, 4) numbers")
     return values.astype(np.float32)
+
+
+def _asked(arguments, texture: VolumeTexture, entries: Entries) -> dict[str, Any]:
+    """What a function asks for by name, besides normals."""
+    given: dict[str, Any] = {}
+    if "footprint" in arguments:
+        given["footprint"] = texture.octree.spacing(int(texture.octree.tables.levels[entries[0]]))
+    is_told = texture.knows_parts
+    if "faces" in arguments or ("feet" in arguments and is_told):
+        found = dict(zip(("feet", "faces"), texture.feet(entries), strict=True))
+        given |= {name: value for name, value in found.items() if name in arguments}
+    if "feet" in arguments and not is_told:
+        given["feet"] = None
+    return given
 
 
 def _updated(texture: VolumeTexture, layer: Layer, entries: Entries) -> Entries:

@@ -9,29 +9,37 @@ atlas for global illumination in complex production scenes", doi:10.2312/EGWR/EG
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float64, Int32, Int64
+from jaxtyping import Int32, Int64, UInt8
 
 from ..arrays import BrickCoordinates, Number
 from ..errors import MemoryLimitError, TextureError
 from ..grid.brick_index import BRICK, PAGE, BrickIndex
-from ..kernels.box_overlap import count_touching, list_touching
-from ..kernels.octree_tables import FIRST_GROUP, NO_ENTRY, OctreeTables, find_entries, link_entries
-from ..kernels.parallel import n_threads, run_pieces
-from ..kernels.sheets import MAX_SHEETS, find_sheets, pack_normals
+from ..kernels.octree_tables import (
+    ANY_PART,
+    FIRST_BITS,
+    FIRST_GROUP,
+    NO_ENTRY,
+    OctreeTables,
+    find_entries,
+    link_entries,
+)
+from ..kernels.parallel import run_pieces
+from ..kernels.part_sets import MOST_SETS
 from ..mesh import Mesh
 from ..progress import Progress, silent
 from ..sdf.memory import available_memory, estimate_bricks
+from .octree_levels import Level, build_level, face_normals, top_bricks
+from .octree_parts import divided
 
-Triangles = Float64[np.ndarray, "m 3 3"]
+Parts = Int64[np.ndarray, " n"]
 Entries = Int32[np.ndarray, " _"]  # no name: what goes in and what comes out differ in number
 
 MAX_LEVELS = 24
 LARGEST_RESOLUTION = 24000  # so that one root page of 4096 bricks a side covers everything
 BYTES_PER_BRICK = 1500  # tables, and the texels' normals while they are found
-BRICKS_PER_PIECE = 256
+MOST_ENTRIES = 2 * MOST_SETS  # of a brick
 SHARE_OF_FREE = 0.8
 
 
@@ -47,11 +55,16 @@ class Octree:
         Where the entries of every level begin. An entry is one sheet of one brick.
     tables : OctreeTables
         What kernels need.
+    face_parts : (m,) uint8
+        A small number for every face of the surface: where faces that look the same way need the
+        same texels and are apart, they have different ones, and texels of their own. Empty where
+        that is nowhere so.
     """
 
     texel: float
     level_first: Int64[np.ndarray, " l"]
     tables: OctreeTables
+    face_parts: UInt8[np.ndarray, " m"]
 
     @classmethod
     def around(
@@ -60,6 +73,7 @@ class Octree:
         *,
         texel: Number | None = None,
         resolution: Number | None = None,
+        divides: bool = True,
         progress: Progress = silent,
     ) -> "Octree":
         """Find the texels that a mesh needs.
@@ -72,6 +86,9 @@ class Octree:
             Spacing of the finest texels, world units.
         resolution : int, optional
             Or: texels along the longest side of the mesh's box; 512 if neither is given.
+        divides : bool
+            Whether faces that look the same way, are apart and need the same texels get texels of
+            their own; if not, they share them.
 
         Raises
         ------
@@ -84,14 +101,27 @@ class Octree:
         texel = _resolve_texel(mesh, texel, resolution)
         _check_memory(mesh, texel)
         triangles = mesh.welded.points[mesh.welded.faces] / texel
-        normals = _face_normals(triangles)
+        normals = face_normals(triangles)
         levels = []
-        parents = _top_bricks(triangles, n_levels := _n_levels(mesh, texel))
+        parents = top_bricks(triangles, n_levels := _n_levels(mesh, texel))
         for level in range(n_levels - 1, -1, -1):
-            levels.append(_build_level(triangles, normals, 0.5**level, parents))
+            levels.append(build_level(triangles, normals, 0.5**level, parents))
             parents = levels[-1].reach
             progress("octree", 1 - level / n_levels)
-        return _assembled(texel, levels[::-1])
+        levels, parts = levels[::-1], np.empty(0, np.uint8)
+        if divides:
+            levels, parts = divided(triangles, normals, mesh.welded.table, levels)
+        return assembled(texel, levels, parts)
+
+    @property
+    def n_faces(self) -> int:
+        """Faces of the surface, as far as they have numbers: 0 if no sheet is divided."""
+        return len(self.face_parts)
+
+    @property
+    def is_divided(self) -> bool:
+        """Whether some sheet is divided into parts that have texels of their own."""
+        return len(self.face_parts) > 0
 
     @property
     def n_levels(self) -> int:
@@ -119,114 +149,31 @@ class Octree:
         first = self.tables.texel_first[self.level_first[level : level + 2]]
         return int(first[1] - first[0])
 
-    def find(self, level: int, bricks: BrickCoordinates, normals: np.ndarray | None = None):
-        """(n,) int32 entries of bricks (n, 3), of the sheets that look along normals (n, 3)."""
+    def find(
+        self,
+        level: int,
+        bricks: BrickCoordinates,
+        normals: np.ndarray | None = None,
+        parts: Parts | None = None,
+    ):
+        """(n,) int32 entries of bricks (n, 3), of the sheets that look along normals (n, 3) and are
+        of parts (n,), as bits."""
         found = np.empty(len(bricks), np.int32)
         if normals is None:
             normals = np.zeros((len(bricks), 3))
-        find_entries(self.tables, level, np.ascontiguousarray(bricks), normals, found)
+        if parts is None:
+            parts = np.full(len(bricks), ANY_PART, np.int64)
+        find_entries(self.tables, level, np.ascontiguousarray(bricks), normals, parts, found)
         return found
 
-
-@dataclass(frozen=True, eq=False)
-class _Reach:
-    """Bricks (b, 3) in lexicographic order, and the faces[first[i] : first[i + 1]] that reach i."""
-
-    bricks: BrickCoordinates
-    first: Int64[np.ndarray, " b1"]
-    faces: Int32[np.ndarray, " t"]
+    def parts_of(self, faces: np.ndarray) -> Parts | None:
+        """(n,) parts of faces, as bits; None if no sheet is divided."""
+        if not self.is_divided:
+            return None
+        return np.left_shift(np.int64(1), self.face_parts[faces].astype(np.int64))
 
 
-@dataclass(frozen=True, eq=False)
-class _Level:
-    reach: _Reach
-    masks: np.ndarray  # (b, 2, 8) uint64
-    n_sheets: np.ndarray  # (b,) int32
-    means: np.ndarray  # (b, 2, 3) float32
-    texel_normals: np.ndarray  # (t, 2) int8
-
-
-def _build_level(triangles, normals, scale: float, parents: _Reach) -> _Level:
-    """The bricks of one level, found among the children of those a level up."""
-    reach = _children(triangles, scale, parents)
-    n = len(reach.bricks)
-    masks = np.empty((n, MAX_SHEETS, BRICK), np.uint64)
-    n_sheets = np.empty(n, np.int32)
-    means = np.empty((n, MAX_SHEETS, 3), np.float32)
-    pieces = _even_work(reach.first, BRICKS_PER_PIECE)
-    packed = [np.empty((0, 2), np.int8)] * len(pieces)
-
-    def work(piece: int) -> None:
-        begin, end = pieces[piece]
-        texels = np.empty((end - begin, MAX_SHEETS, BRICK**3, 2), np.int8)
-        find_sheets(
-            triangles, normals, scale, reach.bricks, reach.first, reach.faces, begin, end,
-            masks, n_sheets, means, texels,
-        )  # fmt: skip
-        kept = np.arange(MAX_SHEETS) < n_sheets[begin:end, None]
-        n_texels = int(np.bitwise_count(masks[begin:end][kept]).sum())
-        packed[piece] = np.empty((n_texels, 2), np.int8)
-        pack_normals(begin, end, masks, n_sheets, texels, packed[piece])
-
-    run_pieces(work, len(pieces))
-    return _Level(
-        reach, masks, n_sheets, means, np.concatenate([np.empty((0, 2), np.int8), *packed])
-    )
-
-
-def _children(triangles: Triangles, scale: float, parents: _Reach) -> _Reach:
-    """The bricks of the next finer level that triangles reach, with the lists of those."""
-    corner = np.indices((2, 2, 2)).reshape(3, 8).T
-    bricks = (2 * parents.bricks[:, None] + corner).reshape(-1, 3)
-    starts = np.repeat(parents.first[:-1], 8)
-    stops = np.repeat(parents.first[1:], 8)
-    counts = np.zeros(len(bricks), np.int64)
-    pieces = _even_work(np.concatenate([[0], np.cumsum(stops - starts)]), 4096)
-
-    def count(piece: int) -> None:
-        part = slice(*pieces[piece])
-        count_touching(
-            triangles, scale, bricks[part], starts[part], stops[part], parents.faces, counts[part]
-        )
-
-    run_pieces(count, len(pieces))
-    hit = counts > 0
-    bricks, starts, stops, counts = bricks[hit], starts[hit], stops[hit], counts[hit]
-    order = np.lexsort(bricks.T[::-1])
-    bricks, starts, stops = bricks[order], starts[order], stops[order]
-    first = np.concatenate([[0], np.cumsum(counts[order])])
-    faces = np.empty(first[-1], np.int32)
-    pieces = _even_work(np.concatenate([[0], np.cumsum(stops - starts)]), 4096)
-
-    def fill(piece: int) -> None:
-        part = slice(*pieces[piece])
-        list_touching(
-            triangles, scale, bricks[part], starts[part], stops[part], parents.faces,
-            first[:-1][part], faces,
-        )  # fmt: skip
-
-    run_pieces(fill, len(pieces))
-    return _Reach(bricks, first, faces)
-
-
-def _top_bricks(triangles: Triangles, n_levels: int) -> _Reach:
-    """Bricks two levels of whose size hold everything, each with all the faces."""
-    scale = 0.5**n_levels
-    low = np.floor((triangles.min(axis=(0, 1)) * scale - 2) / BRICK).astype(np.int64)
-    high = np.floor((triangles.max(axis=(0, 1)) * scale + 2) / BRICK).astype(np.int64)
-    bricks = np.stack(
-        np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(low, high, strict=True)), indexing="ij"),
-        axis=-1,
-    ).reshape(-1, 3)
-    n_faces = len(triangles)
-    return _Reach(
-        bricks,
-        np.arange(len(bricks) + 1, dtype=np.int64) * n_faces,
-        np.tile(np.arange(n_faces, dtype=np.int32), len(bricks)),
-    )
-
-
-def _assembled(texel: float, levels: list[_Level]) -> Octree:
+def assembled(texel: float, levels: list[Level], face_parts: np.ndarray) -> Octree:
     """One table of all levels."""
     heads, pages, groups = np.empty((len(levels), 4), np.int64), [], []
     n_pages = n_entries = n_groups = 0
@@ -235,7 +182,7 @@ def _assembled(texel: float, levels: list[_Level]) -> Octree:
         index = BrickIndex.from_coordinates(level.reach.bricks)
         code = n_entries + np.cumsum(level.n_sheets) - level.n_sheets
         split = np.flatnonzero(level.n_sheets > 1)
-        groups.append(np.stack([code[split], level.n_sheets[split]], axis=1))
+        groups.append(_groups(level, code[split] - n_entries, n_entries, split))
         code[split] = FIRST_GROUP - n_groups - np.arange(len(split))
         n_groups += len(split)
         heads[number] = *index.origin, n_pages
@@ -243,27 +190,41 @@ def _assembled(texel: float, levels: list[_Level]) -> Octree:
         n_pages += len(pages[-1])
         n_entries += int(level.n_sheets.sum())
         level_first.append(n_entries)
-    kept = [np.arange(MAX_SHEETS) < level.n_sheets[:, None] for level in levels]
-    masks = np.concatenate([level.masks[k] for level, k in zip(levels, kept, strict=True)])
+    groups = np.concatenate(groups).astype(np.int32)
+    if (groups[:, FIRST_BITS:] == ANY_PART).all():
+        groups = np.ascontiguousarray(groups[:, :FIRST_BITS])
+    masks = np.concatenate([level.masks for level in levels])
     tables = OctreeTables(
         heads=heads,
         pages=np.concatenate(pages),
-        groups=np.concatenate(groups).astype(np.int32),
+        groups=groups,
         bricks=np.concatenate([np.repeat(v.reach.bricks, v.n_sheets, axis=0) for v in levels]),
         levels=np.repeat(np.arange(len(levels), dtype=np.int32), np.diff(level_first)),
         masks=masks,
-        sheets=np.concatenate([v.means[k] for v, k in zip(levels, kept, strict=True)]),
+        sheets=np.concatenate([level.means for level in levels]),
         neighbors=np.empty((n_entries, 27), np.int32),
         parents=np.full(n_entries, NO_ENTRY, np.int32),
         texel_first=_starts(np.bitwise_count(masks).sum(axis=1)),
         texel_normals=np.concatenate([level.texel_normals for level in levels]),
         texel=texel,
+        texel_parts=np.concatenate([level.texel_parts for level in levels]),
     )
     run_pieces(
         lambda piece: link_entries(tables, 4096 * piece, min(4096 * (piece + 1), n_entries)),
         -(-n_entries // 4096),
     )
-    return Octree(texel, np.array(level_first, np.int64), tables)
+    return Octree(texel, np.array(level_first, np.int64), tables, face_parts)
+
+
+def _groups(level: Level, own: np.ndarray, first: int, split: np.ndarray) -> np.ndarray:
+    """Rows of `OctreeTables.groups` for the bricks ``split`` of a level, whose entries begin at
+    ``own``, counted from the level's ``first``."""
+    rows = np.full((len(split), FIRST_BITS + MOST_ENTRIES), ANY_PART, np.int64)
+    rows[:, 0], rows[:, 1] = first + own, level.n_sheets[split]
+    for sheet in range(MOST_ENTRIES):
+        has = rows[:, 1] > sheet
+        rows[has, FIRST_BITS + sheet] = level.parts[own[has] + sheet]
+    return rows
 
 
 def _page_table(index: BrickIndex, code: np.ndarray, first: int) -> np.ndarray:
@@ -282,23 +243,6 @@ def _page_table(index: BrickIndex, code: np.ndarray, first: int) -> np.ndarray:
 
 def _starts(counts) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64)
-
-
-def _even_work(first: np.ndarray, per_piece: int) -> list[tuple[int, int]]:
-    """Ranges of items of about equal work, where item i costs ``first[i + 1] - first[i]`` + 1."""
-    n = len(first) - 1
-    n_pieces = max(1, min(n, max(-(-n // per_piece), 4 * n_threads())))
-    cost = first[1:] + np.arange(1, n + 1)
-    goals = cost[-1] * np.arange(1, n_pieces) // n_pieces if n else []
-    cuts = np.unique(np.concatenate([[0], np.searchsorted(cost, goals) + 1, [n]]))
-    return [(int(a), int(b)) for a, b in pairwise(cuts)]
-
-
-def _face_normals(triangles: Triangles) -> np.ndarray:
-    """(m, 3) float64 unit normals; zero for faces without area."""
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    length = np.linalg.norm(cross, axis=1, keepdims=True)
-    return np.divide(cross, length, out=np.zeros_like(cross), where=length > 0)
 
 
 def _n_levels(mesh: Mesh, texel: float) -> int:

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Points
+from ..kernels.octree_tables import ANY_PART, FIRST_GROUP
 from ..kernels.texture_lookup import ABSENT
 from .change import same_texels
 from .layer import Layer
 from .lookup import Footprint
 from .mip import evaluated
-from .octree import Entries
+from .octree import Entries, Parts
 from .refine import refine
 from .volume_texture import Normals, VolumeTexture
 
@@ -109,6 +110,7 @@ def fill_seen(
     points: Points,
     normals: Normals | None,
     footprint: Footprint = 0.0,
+    parts: Parts | None = None,
 ) -> None:
     """Evaluate what `VolumeTexture.colors` needs to show points."""
     spacing, top = texture.octree.texel, texture.octree.n_levels - 1
@@ -116,12 +118,13 @@ def fill_seen(
     levels = np.floor(np.log2(np.fmax(np.broadcast_to(footprint, len(points)) / spacing, 1.0)))
     levels = np.where(known, np.minimum(levels, top), -1).astype(np.int64)
     directions = np.zeros_like(points) if normals is None else normals
+    bits = np.full(len(points), ANY_PART, np.int64) if parts is None else parts
     wanted = [np.empty(0, np.int32)]
     for level in range(top + 1):
         here = np.flatnonzero(levels == level)
         if len(here):
             cells = np.floor(points[here] / texture.octree.spacing(level)).astype(np.int64)
-            found = _around(texture, level, cells, directions[here])
+            found = _around(texture, level, cells, directions[here], bits[here])
             wanted.append(np.unique(found))
             # Where no brick is, the next level shows
             levels[here[(found < 0).all(axis=1)]] += 1
@@ -129,16 +132,21 @@ def fill_seen(
     fill(texture, layer, entries[entries >= 0])
 
 
-def _around(texture: VolumeTexture, level: int, cells: np.ndarray, directions: Normals):
+def _around(
+    texture: VolumeTexture, level: int, cells: np.ndarray, directions: Normals, parts: Parts
+):
     """(n, 8) int32 entries of the corners of cells (n, 3), -1 where there are none."""
     bricks = cells >> 3
-    own = texture.octree.find(level, bricks, directions)
+    own = texture.octree.find(level, bricks, directions, parts)
     found = np.empty((len(cells), 8), np.int32)
     for n, corner in enumerate(CORNERS):
         step = ((cells + corner) >> 3) - bricks
         beside = texture.octree.tables.neighbors[own, SELF + step @ STEPS]
-        alone = own < 0
-        beside[alone] = texture.octree.find(level, bricks[alone] + step[alone], directions[alone])
+        # A brick of which the table says several sheets is looked up where these may be divided
+        alone = (own < 0) | (texture.octree.is_divided & (beside <= FIRST_GROUP))
+        beside[alone] = texture.octree.find(
+            level, bricks[alone] + step[alone], directions[alone], parts[alone]
+        )
         found[:, n] = beside
     return found
 
@@ -149,7 +157,5 @@ def _evaluate(texture: VolumeTexture, layer: ProceduralLayer, entries: Entries) 
         own = entries[levels == level]
         for begin in range(0, len(own), ENTRIES_PER_CALL):
             part = own[begin : begin + ENTRIES_PER_CALL]
-            points, normals = texture.places(part)
-            spacing = texture.octree.spacing(int(level))
-            texture.put(layer, part, evaluated(layer.function, points, normals, spacing))
+            texture.put(layer, part, evaluated(layer.function, texture, part))
             texture.collapse_uniform(layer, part)

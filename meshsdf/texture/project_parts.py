@@ -28,6 +28,9 @@ PARTS = {
     "masks": ("<u8", 8),
     "sheets": ("<f4", 3),
     "texel_normals": ("|i1", 2),
+    "parts": ("<i4", 1),
+    "texel_parts": ("|u1", 1),
+    "face_parts": ("|u1", 1),
 }
 
 
@@ -99,10 +102,12 @@ def read_parts(
     mesh = None
     if n_faces and {"vertices", "faces"} <= set(arrays):
         mesh = Mesh(arrays["vertices"].astype(np.float64), arrays["faces"].astype(np.int32))
-    if {"level_first", "bricks", "masks", "sheets", "texel_normals"} <= set(arrays):
+    if set(PARTS) - {"vertices", "faces"} <= set(arrays):
         octree = octree_of_arrays(texel, arrays)
     elif mesh is not None:
-        octree = Octree.around(mesh, texel=texel)
+        # Where the numbers of faces are known to be none, sheets were not divided
+        divides = "face_parts" not in arrays or len(arrays["face_parts"]) > 0
+        octree = Octree.around(mesh, texel=texel, divides=divides)
     else:
         raise Damaged(f"neither mesh nor texels can be found: {'; '.join(lost)}")
     if not lost and _sha256({n: a for n, a in arrays.items() if len(a)}) != sha256:

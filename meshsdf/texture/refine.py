@@ -11,9 +11,11 @@ from jaxtyping import Int32
 
 from ..arrays import Number
 from ..errors import TextureError
+from ..kernels.octree_tables import NO_ENTRY
 from ..kernels.parallel import even_ranges, run_pieces
-from ..kernels.texel_places import texel_places
+from ..kernels.texel_places import texel_bits, texel_places
 from ..kernels.texture_lookup import ABSENT, FIRST_TILE
+from ..kernels.texture_mip import most_sheets
 from ..kernels.texture_refine import FAMILY, constant_families, parents_around
 from ..kernels.texture_sample import sample
 from ..progress import Progress, silent
@@ -23,7 +25,7 @@ from .layer import Layer
 from .octree import Entries
 from .volume_texture import VolumeTexture
 
-Family = Int32[np.ndarray, "n 54"]
+Family = Int32[np.ndarray, "n _"]
 
 ENTRIES_PER_PIECE = 1024
 ENTRIES_AT_ONCE = 8192  # so that places and colours take 150 MB at most
@@ -165,10 +167,20 @@ def level_range(texture: VolumeTexture, level: int, where: str) -> tuple[int, in
 
 def family_of(texture: VolumeTexture, entries: Entries) -> Family:
     """All sheets of the 27 bricks around the parents of entries; -1 fills the rows."""
-    family = np.empty((len(entries), FAMILY), np.int32)
+    tables = texture.octree.tables
+    width = 27 * most_sheets(tables.groups)
+    if width > FAMILY:
+        widest = 0
+        for begin in range(0, len(entries), ENTRIES_AT_ONCE):
+            part = entries[begin : begin + ENTRIES_AT_ONCE]
+            rows = np.empty((len(part), width), np.int32)
+            parents_around(tables, part, 0, len(part), rows)
+            widest = max(widest, int((rows != NO_ENTRY).sum(axis=1).max()))
+        width = max(widest, 1)
+    family = np.empty((len(entries), width), np.int32)
     ranges = even_ranges(len(entries), -(-len(entries) // ENTRIES_PER_PIECE))
     run_pieces(
-        lambda piece: parents_around(texture.octree.tables, entries, *ranges[piece], family),
+        lambda piece: parents_around(tables, entries, *ranges[piece], family),
         len(ranges) if len(entries) else 0,
     )
     return family
@@ -183,6 +195,8 @@ def seen_above(
     n_texels = tables.texel_first[entries + 1] - tables.texel_first[entries]
     first = np.concatenate([[0], np.cumsum(n_texels)])
     points, normals = np.empty((first[-1], 3)), np.empty((first[-1], 3))
+    parts = np.empty(first[-1], np.int64)
+    texel_bits(tables, entries, first, parts)
     seen = np.empty((first[-1], 4), np.float32)
     ranges = even_ranges(len(entries), -(-len(entries) // (ENTRIES_PER_PIECE // 8)))
     width = np.array([2.0 ** (int(tables.levels[entries[0]]) + 1 if level is None else level)])
@@ -193,7 +207,7 @@ def seen_above(
         begin, end = ranges[piece]
         texel_places(tables, entries, first, begin, end, points, normals)
         sample(
-            tables, layer.slots, pool, tiles, kind, points, normals, width, first[begin],
+            tables, layer.slots, pool, tiles, kind, points, normals, parts, width, first[begin],
             first[end], seen,
         )  # fmt: skip
 

@@ -101,6 +101,7 @@ def _seen(texture, layer, brush: Brush, entries: Entries, level: int) -> Numbers
     colors = look_up(
         texture.octree, layer.slots, texture.pool.use(name), texture.tiles.arrays[name],
         texture.channels[name].kind, points, normals, texture.octree.spacing(level),
+        parts=texture.texel_parts(entries),
     )  # fmt: skip
     if name == "base":
         colors = srgb_rgba(colors)

@@ -8,11 +8,12 @@ from jaxtyping import Float64, UInt64
 from ..kernels.brush import CHANGED, FALLOFFS, WANTED, deposit, same_texels
 from ..kernels.brush_reach import ROW, entries_in_reach
 from ..kernels.geodesic_gate import connected_texels
+from ..kernels.octree_tables import ANY_PART
 from ..kernels.parallel import even_ranges, n_threads, run_pieces
 from ..kernels.texture_lookup import ABSENT
 from .brush import Brush
 from .layer import Layer
-from .octree import Entries
+from .octree import Entries, Parts
 from .refine import refine
 from .volume_texture import VolumeTexture
 
@@ -80,12 +81,13 @@ class Cover:
         found = self._reached(dabs)
         changed = np.empty((len(found), 8), np.uint64)
         state = np.empty(len(found), np.uint8)
-        gates = self._gates(found, dabs)
+        parts = self._parts(dabs)
+        gates = self._gates(found, dabs, parts)
         octree, slots = self.texture.octree, self.layer.slots
 
         def work(begin: int, end: int) -> None:
             deposit(
-                octree.tables, found, begin, end, slots, self.marks, dabs, copies, self._tip,
+                octree.tables, found, begin, end, slots, self.marks, dabs, parts, copies, self._tip,
                 self._numbers, self._stamp, self._stencil, self._matrix, gates, self.coverage,
                 changed, state,
             )  # fmt: skip
@@ -142,7 +144,16 @@ class Cover:
             self.base = np.concatenate([self.base, np.full(more, NOT_TAKEN, np.int32)])
         return self._found[:n].copy()
 
-    def _gates(self, found: Entries, dabs: Dabs) -> UInt64[np.ndarray, "a b 8"]:
+    def _parts(self, dabs: Dabs) -> Parts:
+        """(d,) the parts of the surface, as bits, that are nearest to the ends of dabs."""
+        octree = self.texture.octree
+        if self._brush.through or not self.texture.knows_parts:
+            return np.full(len(dabs), ANY_PART, np.int64)
+        ends = np.ascontiguousarray(dabs[:, :6].reshape(-1, 3)) * octree.texel
+        faces = self.texture.nearest_places(ends)[2]
+        return np.bitwise_or.reduce(octree.parts_of(faces).reshape(-1, 2), axis=1)
+
+    def _gates(self, found: Entries, dabs: Dabs, parts: Parts) -> UInt64[np.ndarray, "a b 8"]:
         if not self._brush.geodesic:
             return np.zeros((1, 1, 8), np.uint64)
         gates = np.empty((len(dabs), max(len(found), 1), 8), np.uint64)
@@ -150,7 +161,7 @@ class Cover:
         run_ranges(
             lambda begin, end: connected_texels(
                 tables, found, len(found), self._batch, self.marks, self.finest, self.level, dabs,
-                begin, end, gates,
+                parts, begin, end, gates,
             ),
             len(dabs), len(found),
         )  # fmt: skip

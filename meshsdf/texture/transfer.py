@@ -11,8 +11,10 @@ import numpy as np
 from jaxtyping import Float32
 from scipy.spatial import cKDTree
 
-from ..arrays import Number, Points
+from ..arrays import Indices, Number, Points
 from ..errors import TextureError
+from ..kernels.face_numbers import MOST_NUMBERS
+from ..kernels.octree_tables import ANY_PART
 from ..kernels.texture_lookup import ABSENT, FIRST_TILE
 from ..mesh import Mesh
 from ..progress import Progress, silent
@@ -20,7 +22,7 @@ from .layer import Layer
 from .lookup import look_up
 from .mesh_change import MeshChange, face_normals
 from .mip import used_channels
-from .octree import Entries, Octree
+from .octree import Entries, Octree, Parts
 from .procedural_layer import ProceduralLayer, fill, is_painted, restart
 from .refine import family_of, texel_mask
 from .volume_texture import Normals, VolumeTexture
@@ -120,7 +122,7 @@ class _Plan:
         Texels that the old entry has, too.
     whole : (n,) bool
         All of the entry's texels are copied.
-    points, normals : (t, 3) float64
+    points, normals, parts : (t, 3) float64, (t, 3) float64, (t,) int64
         Where the old texture is looked up for what is not copied.
     confidence : (t,) float32
     """
@@ -131,6 +133,7 @@ class _Plan:
     whole: np.ndarray
     points: Points
     normals: Normals
+    parts: Parts
     confidence: np.ndarray
 
 
@@ -140,13 +143,14 @@ def _plan(texture, new, change: MeshChange, level: int, reach: float) -> _Plan:
     old = np.full(len(entries), -1, np.int32)
     if level < known.n_levels:
         sheets = octree.tables.sheets[entries].astype(np.float64)
-        old = known.find(level, octree.tables.bricks[entries], sheets)
+        told = _old_parts(texture, new, change, entries)
+        old = known.find(level, octree.tables.bricks[entries], sheets, told)
     exists = texel_mask(new, entries)
     points, normals = new.places(entries)
     copied = exists & (old >= 0)[:, None]
     copied[old >= 0] &= texel_mask(texture, old[old >= 0])
     copied &= _same_way(texture, old, exists, copied, normals)
-    confidence = np.ones(len(points), np.float32)
+    confidence, parts = np.ones(len(points), np.float32), _parts_before(texture, old, exists)
     rows = np.nonzero(exists)[0]
     spacing = octree.spacing(level)
     middles = spacing * (8.0 * octree.tables.bricks[entries] + 3.5)
@@ -155,11 +159,12 @@ def _plan(texture, new, change: MeshChange, level: int, reach: float) -> _Plan:
     spot = np.flatnonzero(touched[rows])
     if len(spot):
         keeps = copied[exists]
-        place = points, normals, confidence, keeps
-        _reproject(change, *place, spot, spacing, reach * known.texel)
+        here = _next_to(new, change, entries, spot, points)
+        place = points, normals, parts, confidence, keeps
+        _reproject(change, known, here, *place, spot, spacing, reach * known.texel)
         copied[exists] = keeps
     whole = (copied == exists).all(axis=1)
-    return _Plan(entries, old, copied, whole, points, normals, confidence)
+    return _Plan(entries, old, copied, whole, points, normals, parts, confidence)
 
 
 def _same_way(texture, old: Entries, exists, copied, normals: Normals) -> np.ndarray:
@@ -177,16 +182,49 @@ def _same_way(texture, old: Entries, exists, copied, normals: Normals) -> np.nda
     return same
 
 
+def _old_parts(texture, new, change: MeshChange, entries: Entries) -> Parts | None:
+    """(n,) the part of the old surface that most texels of each entry are next to, as a bit."""
+    known = texture.octree
+    if not texture.knows_parts:
+        return None
+    feet, _ = new.feet(entries)
+    numbers = known.face_parts[change.old(feet).face_index].astype(np.int64)
+    counts = np.diff(new.octree.tables.texel_first)[entries]
+    rows = MOST_NUMBERS * np.repeat(np.arange(len(entries)), counts) + numbers
+    votes = np.bincount(rows, minlength=MOST_NUMBERS * len(entries)).reshape(-1, MOST_NUMBERS)
+    return np.left_shift(np.int64(1), votes.argmax(axis=1))
+
+
+def _parts_before(texture, old: Entries, exists) -> Parts:
+    """(t,) the parts of the old texels in the place of new ones that are in ``exists`` (n, 512)."""
+    parts = np.full(exists.shape, ANY_PART, np.int64)
+    found = np.flatnonzero(old >= 0)
+    if texture.octree.is_divided and len(found):
+        own = np.full((len(found), exists.shape[1]), ANY_PART, np.int64)
+        own[texel_mask(texture, old[found])] = texture.texel_parts(old[found])
+        parts[found] = own
+    return parts[exists]
+
+
+def _next_to(new, change: MeshChange, entries: Entries, spot, points) -> tuple[Points, Indices]:
+    """The places of the new surface next to the texels ``spot`` of entries, and their faces."""
+    if not new.octree.is_divided:
+        here = change.new(points[spot])
+        return here.point, here.face_index
+    feet, faces = new.feet(entries)
+    return feet[spot], faces[spot]
+
+
 def _reproject(
-    change: MeshChange, points, normals, confidence, keeps, spot, spacing: float, reach: float
-) -> None:
+    change: MeshChange, known: Octree, here: tuple[Points, Indices], points, normals, parts,
+    confidence, keeps, spot, spacing: float, reach: float,
+) -> None:  # fmt: skip
     """For the texels ``spot`` of a level: set the confidence and whether the old texel's number is
     kept, and for the others the place to look up."""
-    here = change.new(points[spot])
-    feet = _off_the_edge(here.point, change.new.mesh.triangles[here.face_index], spacing)
+    feet = _off_the_edge(here[0], change.new.mesh.triangles[here[1]], spacing)
     there = change.old(feet)
     old_normals = face_normals(change.old.mesh)[there.face_index]
-    new_normals = face_normals(change.new.mesh)[here.face_index]
+    new_normals = face_normals(change.new.mesh)[here[1]]
     along = np.clip((old_normals * new_normals).sum(axis=1), 0, 1)
     trust = np.clip(1 - there.distance / reach, 0, 1) * along
     near = change.is_near(points[spot], CLEAR * spacing)
@@ -195,6 +233,8 @@ def _reproject(
     keeps[spot] &= ~near | (there.distance <= STILL * spacing)
     moves = ~keeps[spot]
     points[spot[moves]], normals[spot[moves]] = there.point[moves], old_normals[moves]
+    if known.n_faces == change.old.mesh.n_faces:
+        parts[spot[moves]] = known.parts_of(there.face_index[moves])
     lost = moves & (confidence[spot] == 0)
     good = np.ones(len(points), bool)
     good[spot[lost]] = False
@@ -202,6 +242,7 @@ def _reproject(
         source = np.flatnonzero(good)
         nearest = source[cKDTree(points[source]).query(feet[lost])[1]]
         points[spot[lost]], normals[spot[lost]] = points[nearest], normals[nearest]
+        parts[spot[lost]] = parts[nearest]
 
 
 def _off_the_edge(points: Points, corners: np.ndarray, spacing: float) -> Points:
@@ -270,7 +311,7 @@ def _stored(texture, new, layer: Layer, level: int, plan: _Plan) -> np.ndarray:
     row = np.repeat(np.arange(len(first)), first)
     some = np.flatnonzero(~(plan.whole | wanted)[row])
     bricks = np.floor(plan.points[some] / (8 * new.octree.spacing(level))).astype(np.int64)
-    found = texture.octree.find(level, bricks, plan.normals[some])
+    found = texture.octree.find(level, bricks, plan.normals[some], plan.parts[some])
     hit = (found >= 0) & (layer.slots[found] != ABSENT)
     wanted[row[some[hit]]] = True
     return wanted
@@ -300,7 +341,7 @@ def _fill(texture, new, layer: Layer, made: Layer, level: int, plan: _Plan, rest
         pool, tiles = texture.pool.use(name), texture.tiles.arrays[name]
         values = look_up(
             texture.octree, layer.slots, pool, tiles, texture.channels[name].kind,
-            plan.points[chosen], plan.normals[chosen], width,
+            plan.points[chosen], plan.normals[chosen], width, parts=plan.parts[chosen],
         )  # fmt: skip
         new.put(made, entries, values, channel=name)
         known = np.where(

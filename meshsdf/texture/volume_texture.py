@@ -13,10 +13,11 @@ from weakref import WeakValueDictionary
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from ..arrays import Number, Points
+from ..arrays import Indices, Number, Points
 from ..errors import TextureError
+from ..kernels.octree_tables import ANY_PART
 from ..kernels.parallel import even_ranges, run_pieces
-from ..kernels.texel_places import put_texels, texel_places, uniform_entries
+from ..kernels.texel_places import put_texels, texel_bits, texel_places, uniform_entries
 from ..kernels.texture_lookup import ABSENT
 from ..mesh import Mesh
 from ..progress import Progress, silent
@@ -24,8 +25,9 @@ from ..spatial import ClosestPoint
 from .channels import Numbers, channels_with
 from .layer import Layer
 from .lookup import Footprint, look_up
-from .octree import Entries, Octree
+from .octree import Entries, Octree, Parts
 from .pool import BrickPool, TilePool
+from .surface_parts import Feet, parts_at
 
 Normals = Float64[np.ndarray, "n 3"]
 Color = tuple[Number, ...] | list[Number] | Float32[np.ndarray, "c"]
@@ -64,6 +66,7 @@ class VolumeTexture:
         self.layers: list[Layer] = []
         self.surface: Mesh | None = None
         self._closest: ClosestPoint | None = None
+        self._feet: Feet | None = None
         self._next_number = 0
         self._layers_ever: WeakValueDictionary[int, Layer] = WeakValueDictionary()
         self.flattened: Any = None  # what `layers.shown` keeps
@@ -160,6 +163,7 @@ class VolumeTexture:
         channel: str = "base",
         layer: Layer | None = None,
         project: bool = False,
+        parts: Parts | None = None,
     ) -> Numbers:
         """What the texture shows at points.
 
@@ -178,6 +182,10 @@ class VolumeTexture:
             Of this layer alone; else of all that are visible, blended.
         project : bool
             Look up the closest point of the surface (and its normal) in place of the point.
+        parts : (n,) int64, optional
+            What ``octree.parts_of`` says of the faces that the points lie on: it tells sheets apart
+            that look the same way and lie closer than texels. Where it matters and is not given,
+            the closest point of the surface tells.
 
         Returns
         -------
@@ -194,8 +202,11 @@ class VolumeTexture:
             what = f"there is no channel {channel!r}"
             raise TextureError(what, "channel=...", f"use one of {', '.join(self.channels)}")
         if project:
-            points, normals = self.on_surface(points)
-        self._fill_seen(layer, points, normals, footprint)
+            points, normals, faces = self.nearest_places(points)
+            parts = self.octree.parts_of(faces) if self.knows_parts else None
+        elif parts is None and self.knows_parts:
+            parts = self._parts_at(layer, points, footprint)
+        self._fill_seen(layer, points, normals, footprint, parts)
         slots = (layer or self._shown()).slots
         pool = self.pool.arrays.get(channel)
         kind = self.channels[channel]
@@ -204,7 +215,7 @@ class VolumeTexture:
             slots = np.where(slots >= 0, self._nothing(), slots)
         return look_up(
             self.octree, slots, pool, self.tiles.arrays[channel], kind.kind, points, normals,
-            footprint,
+            footprint, parts=parts,
         )  # fmt: skip
 
     def on_surface(self, points: Points) -> tuple[Points, Normals]:
@@ -215,15 +226,44 @@ class VolumeTexture:
         TextureError
             The texture knows of no surface.
         """
+        return self.nearest_places(points)[:2]
+
+    def nearest_places(self, points: Points) -> tuple[Points, Normals, Indices]:
+        """As `on_surface`, and the faces that the points lie on."""
         if self.surface is None:
             what = "the texture does not know its surface"
             raise TextureError(what, "project=True", "set texture.surface to the mesh")
-        if self._closest is None or self._closest.mesh is not self.surface:
-            self._closest = ClosestPoint(self.surface)
-        found = self._closest(points)
+        found = self._closest_point()(points)
         corners = self.surface.vertices[self.surface.faces[found.face_index]]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return found.point, normals
+        return found.point, normals, found.face_index
+
+    @property
+    def knows_parts(self) -> bool:
+        """Whether some sheet is divided, and the surface is what the octree was made around."""
+        octree, surface = self.octree, self.surface
+        return octree.is_divided and surface is not None and surface.n_faces == octree.n_faces
+
+    def feet(self, entries: Entries) -> tuple[Points, Indices]:
+        """The surface's places (n, 3) next to the texels of entries, in the order of `places`, and
+        the faces (n,) they lie on, each on the texel's own part; errors as `on_surface`."""
+        if self.surface is None:
+            what = "the texture does not know its surface"
+            raise TextureError(what, "feet(entries)", "set texture.surface to the mesh")
+        if self._feet is None or self._feet.mesh is not self.surface:
+            self._feet = Feet(self.surface, self.octree)
+        points, normals = self.places(entries)
+        parts = self.texel_parts(entries) if self.knows_parts else np.full(len(points), ANY_PART)
+        widths = self.octree.texel * 2.0 ** self.octree.tables.levels[entries]
+        spacing = np.repeat(widths, np.diff(self._first(entries)))
+        return self._feet(points, normals, parts, spacing)
+
+    def texel_parts(self, entries: Entries) -> Parts:
+        """(n,) parts, as bits, of the texels of entries, in the order of `places`."""
+        first = self._first(entries)
+        parts = np.empty(first[-1], np.int64)
+        texel_bits(self.octree.tables, entries, first, parts)
+        return parts
 
     def places(self, entries: Entries) -> tuple[Points, Normals]:
         """Positions and unit normals (n, 3) of the texels of entries, one entry after another."""
@@ -311,13 +351,24 @@ class VolumeTexture:
         first = self.octree.tables.texel_first
         return np.concatenate([[0], np.cumsum(first[entries + 1] - first[entries])])
 
-    def _fill_seen(self, layer, points, normals, footprint) -> None:
+    def _closest_point(self) -> ClosestPoint:
+        if self._closest is None or self._closest.mesh is not self.surface:
+            self._closest = ClosestPoint(self.surface)
+        return self._closest
+
+    def _parts_at(self, layer: Layer | None, points: Points, footprint: Footprint) -> Parts:
+        """Parts that points are on, by the surface's closest points."""
+        slots = (layer or self._shown()).slots
+        widths = np.atleast_1d(np.asarray(footprint, np.float64))
+        return parts_at(self.octree, self._closest_point(), slots, points, widths)
+
+    def _fill_seen(self, layer, points, normals, footprint, parts) -> None:
         """Evaluate what procedural layers show at points."""
         for one in [layer] if layer else self.layers:
             if getattr(one, "function", None) is not None and (layer or one.visible):
                 from .procedural_layer import fill_seen  # which imports this module
 
-                fill_seen(self, one, points, normals, footprint)
+                fill_seen(self, one, points, normals, footprint, parts)
 
     def _shown(self) -> Layer:
         from .layers import shown  # which imports this module

@@ -23,6 +23,7 @@ def full_brush() -> Brush:
         angle=(-0.5, 0.5), geodesic=True, stamp=rng.random((3, 5)).astype(np.float32),
         stencil=Stencil(rng.random((4, 2)).astype(np.float32), rng.random((3, 4))), detail=0.01,
         offset=(0.1, 0.0, -0.1), tolerance=0.125, end_color=(0.5, 0.6, 0.7, 0.8), shape="radial",
+        through=True,
     )  # fmt: skip
 
 

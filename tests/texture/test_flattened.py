@@ -19,8 +19,10 @@ from meshsdf.texture.octree import Octree
 from meshsdf.texture.refine import coarsen, texel_mask
 from meshsdf.texture.stroke import Stroke
 from meshsdf.texture.volume_texture import VolumeTexture
+from tests.texture.folded_shapes import plates
 
 BALL = Octree.around(icosphere(subdivisions=3), resolution=60)
+PLATES = Octree.around(plates(0.4, 0.3)[0], texel=2.0)  # two that look the same way
 PLATE = Octree.around(box_mesh((1.0, 1.0, 0.02)), resolution=50)  # two sheets
 
 
@@ -62,17 +64,20 @@ def dab(texture, layer, rng, *, kind="paint"):
     low, high = texture.octree.tables.bricks.min(), 0.5
     way = rng.normal(size=(2, 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)
-    if texture.octree is PLATE:
+    if texture.octree is PLATES:
+        way = rng.uniform([0, 0], [60, 40], (2, 2)) @ np.eye(2, 3) + [0, 0, rng.choice([0.3, 0.7])]
+        normals = np.tile([0.0, 0.0, 1.0], (2, 1))
+    elif texture.octree is PLATE:
         way = rng.uniform(-high, high, size=(2, 3)) * [1, 1, 0] + [0, 0, 0.01]
         normals = np.tile([0.0, 0.0, rng.choice([-1.0, 1.0])], (2, 1))
     else:
         normals = way
-    assert low < 0
+    assert low < 0 or texture.octree is PLATES
     radius = float(rng.choice([2.0, 5.0, 12.0])) * texture.octree.texel
     color = (*rng.uniform(size=3).tolist(), float(rng.choice([1.0, 0.5])))
     channel = str(rng.choice(["base", "base", "mask"]))
     brush = Brush(radius, kind=kind, color=color, hardness=float(rng.uniform()), channel=channel)
-    n = int(rng.integers(1, 3)) if texture.octree is PLATE else 1
+    n = int(rng.integers(1, 3)) if texture.octree is not BALL else 1
     with Stroke(texture, layer, brush) as stroke:
         stroke.add(way[:n], normals[:n])
 
@@ -88,9 +93,11 @@ EDITS = st.lists(
 
 
 @settings(max_examples=15)
-@given(EDITS, st.sampled_from(["ball", "plate"]), st.booleans())
+@given(EDITS, st.sampled_from(["ball", "plate", "plates"]), st.booleans())
 def test_strokes_undo_and_layers_leave_the_bytes_of_composing_anew(edits, shape, is_grounded):
-    texture = VolumeTexture({"ball": BALL, "plate": PLATE}[shape])
+    texture = VolumeTexture({"ball": BALL, "plate": PLATE, "plates": PLATES}[shape])
+    if shape == "plates":
+        texture.surface = plates(0.4, 0.3)[0]
     for color in ((0.0, 0.0, 0.0, 0.0), (0.0, 0.4, 0.0, 0.5), (0.0, 0.0, 0.0, 0.0)):
         texture.add_layer(color=color)
     if is_grounded:

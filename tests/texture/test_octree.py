@@ -16,7 +16,7 @@ from meshsdf.mesh import Mesh
 from meshsdf.mesh.measures import area
 from meshsdf.mesh.primitives import box_mesh, cylinder, icosphere
 from meshsdf.mesh.sampling import sample_surface
-from meshsdf.texture import octree as octree_module
+from meshsdf.texture import octree, octree_levels
 from meshsdf.texture.octree import Octree
 from meshsdf.texture.refine import texel_mask
 from meshsdf.texture.volume_texture import VolumeTexture
@@ -169,7 +169,7 @@ def test_one_thread_and_two_give_the_same_bytes(monkeypatch):
     results = []
     for threads in (1, 2, 3):
         monkeypatch.setattr(parallel, "n_threads", lambda threads=threads: threads)
-        monkeypatch.setattr(octree_module, "n_threads", lambda threads=threads: threads)
+        monkeypatch.setattr(octree_levels, "n_threads", lambda threads=threads: threads)
         results.append(Octree.around(mesh, resolution=200).tables)
     for tables in results[1:]:
         for name, array in results[0]._asdict().items():
@@ -230,7 +230,7 @@ def test_scale_changes_nothing(scale):
 
 
 def test_what_does_not_fit_in_memory_is_refused_before_the_work(monkeypatch):
-    monkeypatch.setattr(octree_module, "available_memory", lambda: 3e8)
+    monkeypatch.setattr(octree, "available_memory", lambda: 3e8)
     Octree.around(icosphere(subdivisions=2), resolution=128)
     with pytest.raises(
         MemoryLimitError, match=r"need about \d+\.\d GB of tables; 0\.3 GB are free"
