@@ -1,9 +1,13 @@
 """``meshsdf mesh``: volume to mesh."""
 
+from dataclasses import asdict
+
 import click
 
 from .console import YES, Console, plural
 from .options import Names, Number, force_option, json_option, path
+
+OPEN = "open at the grid's border"
 
 
 @click.command(epilog="Example: meshsdf mesh bunny.npz bunny.ply")
@@ -63,7 +67,7 @@ def command(
     console = Console("mesh", as_json=as_json)
     console.watch_compilation()
     from ..io import check_input, check_output, read_mesh, read_volume, write_mesh
-    from ..mesh.measures import euler_number, is_watertight
+    from ..mesh.topology import topology as topology_of
     from ..surface import carry as carry_attributes
     from ..surface import (
         choose_normals,
@@ -104,19 +108,18 @@ def command(
     else:
         surface = marching_cubes(loaded, topology=topology, **options)
     require_faces(surface, level=level)
-    shape = {"is_watertight": is_watertight(surface), "euler_number": euler_number(surface)}
+    shape = topology_of(surface)
     if carry is not None:
         with console.stage("carry"):
             surface = carry_attributes(surface, owner, carry, progress=console.progress)
     with console.stage("write"):
         write_mesh(out, surface, force=force)
-    facts = {"n_vertices": surface.n_vertices, "n_faces": surface.n_faces, **shape}
-    closed = "closed" if facts["is_watertight"] else "open at the grid's border"
+    facts = {"n_vertices": surface.n_vertices, "n_faces": surface.n_faces, **asdict(shape)}
     seconds = console.timings("load", "surface", "write")
     console.result(
         f"{out}: {plural(surface.n_vertices, 'vertex', 'vertices')}, "
-        f"{plural(surface.n_faces, 'face')}, {closed}, "
-        f"Euler number {facts['euler_number']}, {seconds['total']:.2f} s"
+        f"{plural(surface.n_faces, 'face')}, "
+        f"{shape.describe(OPEN)}, {seconds['total']:.2f} s"
     )
     head = {"input": volume, "output": out, "method": method, "level": level}
     console.json(head | facts | {"seconds": seconds, "warnings": console.warnings})

@@ -15,6 +15,7 @@ from ..mesh.measures import (
     volume,
     welded,
 )
+from ..mesh.topology import Topology, topology
 from ..progress import Progress, silent
 from .enclosure import Enclosure, ceil_digits, floor_digits
 from .hausdorff import OneSided, hausdorff
@@ -36,6 +37,8 @@ class Measures:
         Handles of all components together; None unless watertight likewise.
     n_boundary_loops : int
         Connected pieces of edges with one face.
+    topology : Topology or None
+        What it is by index, too, and in words.
     """
 
     n_vertices: int
@@ -47,6 +50,7 @@ class Measures:
     is_watertight: bool
     genus: int | None
     n_boundary_loops: int
+    topology: Topology | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +92,18 @@ class Comparison:
     def in_percent(self, length: float) -> float | None:
         """A length in percent of the diagonal of A's box, or None where A is one point."""
         return 100.0 * length / self.diagonal if self.diagonal > 0 else None
+
+    def with_statistics(
+        self, forward: Statistics | None, backward: Statistics | None
+    ) -> "Comparison":
+        """Return the same with certified means in place of estimates, where there are some."""
+        return replace(
+            self,
+            forward=_with_means(self.forward, forward),
+            backward=_with_means(self.backward, backward),
+            forward_statistics=forward,
+            backward_statistics=backward,
+        )
 
     def to_json(self) -> dict:
         """Return plain types: distances in world units, and the largest also in other units."""
@@ -151,7 +167,18 @@ class Comparison:
         }
         before, after = asdict(self.before), asdict(self.after)
         rows = [(label, before[name], after[name]) for name, label in names.items()]
-        return [_row("mesh", "A", "B"), *(_row(n, _number(a), _number(b)) for n, a, b in rows)]
+        lines = [_row(n, _number(a), _number(b)) for n, a, b in rows]
+        for name, measures in (("A", self.before), ("B", self.after)):
+            if measures.topology is not None:
+                lines.append(f"{name}: {measures.topology.describe()}")
+        return [_row("mesh", "A", "B"), *lines]
+
+
+def _with_means(side: OneSided, found: Statistics | None) -> OneSided:
+    """Certified middles in place of estimates."""
+    if found is None:
+        return side
+    return replace(side, mean=found.mean.middle, rms=found.rms.middle)
 
 
 def compare(
@@ -201,17 +228,11 @@ def compare(
     if statistics:
         forward = _statistics(a, b, found.forward, voxel_size, progress)
         backward = _statistics(b, a, found.backward, voxel_size, progress)
-    return Comparison(
-        found.distance,
-        _with_means(found.forward, forward),
-        _with_means(found.backward, backward),
-        _measures(a),
-        _measures(b),
-        a.box.diagonal,
-        voxel_size,
-        forward,
-        backward,
+    measures = _measures(a), _measures(b)
+    known = Comparison(
+        found.distance, found.forward, found.backward, *measures, a.box.diagonal, voxel_size
     )
+    return known.with_statistics(forward, backward)
 
 
 def _statistics(
@@ -222,13 +243,6 @@ def _statistics(
     return one_sided_statistics(
         source, target, at_most=side.distance.upper, voxel_size=voxel_size, progress=progress
     )
-
-
-def _with_means(side: OneSided, found: Statistics | None) -> OneSided:
-    """Certified middles in place of estimates."""
-    if found is None:
-        return side
-    return replace(side, mean=found.mean.middle, rms=found.rms.middle)
 
 
 def _measures(mesh: Mesh) -> Measures:
@@ -244,6 +258,7 @@ def _measures(mesh: Mesh) -> Measures:
         is_watertight=closed,
         genus=genus(joined),
         n_boundary_loops=n_boundary_loops(joined),
+        topology=topology(mesh),
     )
 
 
@@ -252,7 +267,7 @@ def _side_rows(way: str, side: OneSided, found: Statistics | None) -> list[tuple
     rows = []
     for name in ("mean", "rms"):
         if found is None:
-            rows.append((f"{way}, {name}", getattr(side, name), _number))
+            rows.append((f"{way}, {name}", getattr(side, name), _estimate))
         else:
             rows += _interval_rows(f"{way}, {name}", getattr(found, name))
     percentiles = {} if found is None else found.percentiles
@@ -272,6 +287,7 @@ def _side(side: OneSided, statistics: Statistics | None) -> dict:
         "upper": side.distance.upper,
         "mean": side.mean,
         "rms": side.rms,
+        "mean_is_estimate": statistics is None,
         "witness": side.witness.tolist(),
         "nearest": side.nearest.tolist(),
         "source_face": side.source_face,
@@ -287,6 +303,10 @@ def _number(value: float | int | bool | None) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.6g}"
+
+
+def _estimate(value: float) -> str:
+    return f"≈ {value:.3g}"
 
 
 def _row(name: str, *cells: str) -> str:

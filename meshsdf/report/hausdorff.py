@@ -19,11 +19,11 @@ from ..errors import ReportError
 from ..kernels.bvh import closest_details
 from ..kernels.parallel import run_pieces
 from ..mesh import Mesh
-from ..mesh.measures import face_areas
 from ..progress import Progress, silent
 from ..spatial.closest_point import LARGEST, ClosestPoint
 from .branch_and_bound import Search
 from .enclosure import Enclosure
+from .mean_estimate import estimated_means
 from .tolerance import Tolerance
 
 MAX_EVALUATIONS = 10_000_000
@@ -136,7 +136,7 @@ def one_sided_hausdorff(
         Closest points after which no further face is cut; by default 10 million, or 10 per face
         where that is more. The trees and the distances of all vertices are always computed.
     means : bool
-        Estimate mean and rms, which takes one more closest point per face.
+        Estimate mean and rms, which takes one more closest point per face, or some 200,000.
     progress : Progress
         Told the share of the gap that is closed, while cutting.
 
@@ -151,9 +151,8 @@ def one_sided_hausdorff(
     ``328 u (R + r)``, u = 2**-53, R the largest distance of a source vertex from the centre of the
     target's box, r half the diagonal of that box; see `branch_and_bound`. A tolerance below three
     times as much cannot be met.
-    Mean and rms: per face, 3/4 of the value at the centroid and 1/12 at each corner (exact for
-    polynomials of degree 2, so for the squared distance to one plane), weighted by area. Where
-    distances change within a face as at the target's own edges, they are off by O(size²).
+    Mean and rms are estimates by quadrature (`estimated_means`); `one_sided_statistics` encloses
+    them.
     Cost: one closest point per vertex of the source, and one per cut. Where the
     distance is nearly constant, as between offset surfaces, or nearly zero between different
     triangulations of one surface, many cuts are needed; a looser tolerance saves most of them.
@@ -194,7 +193,11 @@ def _enclose(
             break
         search.step()
         progress("hausdorff", 1.0 - (search.upper - search.best) / first_gap)
-    return _result(source, search, _means(source, search, progress) if means else (None, None))
+    found = (None, None)
+    if means:
+        squares = search.corner_squares[search.corners]
+        found = estimated_means(source, closest, squares, progress=progress)
+    return _result(source, search, found)
 
 
 def _result(source: Mesh, search: Search, means: tuple[float | None, float | None]) -> OneSided:
@@ -218,19 +221,6 @@ def _result(source: Mesh, search: Search, means: tuple[float | None, float | Non
         n_evaluations=search.n_evaluations,
         is_within_tolerance=upper - lower <= search.tolerance.width(lower),
     )
-
-
-def _means(source: Mesh, search: Search, progress: Progress) -> tuple[float, float]:
-    """Mean and rms of the distance over the source's area, by quadrature."""
-    areas = face_areas(source)
-    if areas.sum() == 0:
-        areas = np.ones(len(areas))
-    centroids = (source.triangles - search.closest.center).mean(axis=1)
-    inner = search.closest.search(centroids, np.empty(0, np.int32), progress)[0]
-    squares = np.column_stack([search.corner_squares[search.corners], inner])
-    weights = np.outer(areas / areas.sum(), [1 / 12, 1 / 12, 1 / 12, 3 / 4])
-    mean, square = (weights * np.sqrt(squares)).sum(), (weights * squares).sum()
-    return float(mean), float(np.sqrt(square))
 
 
 def _check_meshes(source: Mesh, target: Mesh) -> None:

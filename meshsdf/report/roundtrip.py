@@ -81,6 +81,11 @@ class RoundTripRow:
         scale = self.voxel_size if in_voxels else 1.0
         return self.comparison.distance.upper <= limit * scale
 
+    @property
+    def trip_seconds(self) -> float:
+        """How long the round trip and its largest distance took: all times but the details'."""
+        return sum(spent for name, spent in self.seconds.items() if name != "details")
+
     def to_json(self) -> dict:
         """Return plain types, as the command prints them."""
         head = {
@@ -300,7 +305,10 @@ class _Work:
             else:
                 found = coarse_details(*shapes, row.comparison, row.voxel_size, progress=progress)
             seconds = row.seconds | {"details": round(time.perf_counter() - begin, 4)}
-            rows[i] = replace(row, details=found, seconds=seconds)
+            known = row.comparison.with_statistics(
+                found.forward_statistics, found.backward_statistics
+            )
+            rows[i] = replace(row, comparison=known, details=found, seconds=seconds)
 
     def _compared(self, surface: Mesh, resolution: float, voxel_size: float) -> Comparison:
         needed = BYTES_PER_FACE * (self.mesh.n_faces + surface.n_faces)

@@ -1,5 +1,6 @@
 """What a report says first, in a sentence per method or comparison; written from its JSON."""
 
+from ..mesh.topology import Topology
 from .notation import count, place, written
 from .pair_words import PairWords
 
@@ -91,11 +92,13 @@ def topology_words(measures: dict, same: str = "is kept", other: str = "is not k
     ]
     changes = [f"{name} {written(old)} → {written(new)}" for name, old, new in known if old != new]
     if changes:
-        n = measures["n_repeated_places"]
-        if n > 0:
-            share = "1 vertex shares its place" if n == 1 else f"{written(n)} vertices share places"
-            changes.append(f"counted by position: {share}")
-        return {"is_kept": False, "sentence": f"the topology {other} ({', '.join(changes)})"}
+        told = after.get("topology")
+        rest = ""
+        if told is not None and (by_index := Topology(**told)).differs:
+            changes.append("counted by position")
+            rest = f"; what came back is {by_index.describe()}"
+        words = f"the topology {other} ({', '.join(changes)}){rest}"
+        return {"is_kept": False, "sentence": words}
     facts = [
         f"Euler number {written(before['euler_number'])}",
         count(before["n_components"], "component"),

@@ -1,7 +1,9 @@
 """A round trip as a table for people."""
 
 from .color_difference import ColorDifference
-from .notation import place, written
+from .compare import Comparison
+from .enclosure import Enclosure
+from .notation import interval, place, written
 from .roundtrip import RoundTrip, RoundTripRow
 
 HEADS = (
@@ -18,28 +20,46 @@ HEADS = (
     "parts",
     "seconds",
 )
-WIDTHS = (10, 17, 11, 25, 15, 17, 9, 9, 9, 9, 7, 8)
+GAP = "  "  # between two columns
 
 
 def roundtrip_table(trip: RoundTrip) -> str:
     """Return one line per resolution, the order of the error if there are several, and colours."""
-    lines = ["".join(f"{head:>{width}}" for head, width in zip(HEADS, WIDTHS, strict=True))]
-    lines += [
-        "".join(f"{cell:>{width}}" for cell, width in zip(_cells(row), WIDTHS, strict=False))
-        for row in trip.rows
+    table = [HEADS, *(_cells(row) for row in trip.rows)]
+    widths = [0] * len(HEADS)
+    for cells in table:
+        if len(cells) == len(HEADS):
+            widths = [max(pair) for pair in zip(widths, map(len, cells), strict=True)]
+    lines = [
+        GAP.join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=False))
+        for cells in table
     ]
     orders = [(method, trip.order(method)) for method in trip.methods]
     if found := [f"{method} {order:.2f}" for method, order in orders if order is not None]:
         lines.append(f"observed order of the largest distance: {', '.join(found)}")
-    return "\n".join(lines + color_lines(trip))
+    return "\n".join(lines + topology_lines(trip) + color_lines(trip))
+
+
+def topology_lines(trip: RoundTrip) -> list[str]:
+    """What came back is by index, where that differs from the table's counts by position."""
+    lines = []
+    for row in trip.rows:
+        known = None if row.comparison is None else row.comparison.after.topology
+        if known is not None and known.differs:
+            lines.append(f"{_name(row, trip)}: {known.describe()}")
+    return lines
+
+
+def _name(row: RoundTripRow, trip: RoundTrip) -> str:
+    by = f" by {row.method}" if len(trip.methods) > 1 else ""
+    return f"{row.resolution:g}{by}"
 
 
 def color_lines(trip: RoundTrip) -> list[str]:
     """One line per resolution of what became of the colours, if that was asked."""
     lines = []
     for row in trip.rows if trip.has_colors else ():
-        name = f"colours at {row.resolution:g}"
-        name += f" by {row.method}" if len(trip.methods) > 1 else ""
+        name = f"colours at {_name(row, trip)}"
         if row.colors is None:
             lines.append(f"{name}: nothing came back")
             continue
@@ -72,10 +92,18 @@ def _cells(row: RoundTripRow) -> tuple[str, ...]:
         f"[{lower:.5g}, {upper:.5g}]",
         f"[{found.in_voxels(lower):.3f}, {found.in_voxels(upper):.3f}]",
         f"[{found.in_percent(lower):.4f}, {found.in_percent(upper):.4f}]",
-        f"{found.in_voxels(found.forward.mean):.4f}",
-        f"{found.in_voxels(found.forward.rms):.4f}",
+        *(_average(name, found) for name in ("mean", "rms")),
         volume,
         f"{before.euler_number}>{after.euler_number}",
         f"{before.n_components}>{after.n_components}",
-        f"{sum(row.seconds.values()):.2f}",
+        f"{row.trip_seconds:.2f}",
     )
+
+
+def _average(name: str, found: Comparison) -> str:
+    """Mean or rms over the mesh in voxels: the interval that is proved, or ≈ an estimate."""
+    proved = found.forward_statistics
+    if proved is None:
+        return interval({"estimate": found.in_voxels(getattr(found.forward, name))}, digits=3)
+    span: Enclosure = getattr(proved, name)
+    return interval({end: found.in_voxels(getattr(span, end)) for end in ("lower", "upper")}, 3)

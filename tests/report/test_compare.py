@@ -96,6 +96,7 @@ def test_statistics_stand_in_place_of_the_estimates():
     told = json.loads(json.dumps(found.to_json(), allow_nan=False))["forward"]
     assert told["mean_bounds"]["lower"] <= told["mean"] <= told["mean_bounds"]["upper"]
     assert told["rms_bounds"]["lower"] <= told["rms"] <= told["rms_bounds"]["upper"]
+    assert told["mean_is_estimate"] is False
     assert list(told["percentiles"]) == ["50", "90", "95", "99"]
     # All of the small box is 0.1 inside the large one
     assert found.forward_statistics.mean.contains(0.1)
@@ -108,7 +109,9 @@ def test_without_statistics_the_means_are_estimates():
     assert found.forward_statistics is None
     assert found.forward.mean == pytest.approx(0.1)
     assert "mean_bounds" not in found.to_json()["forward"]
-    assert "A to B, mean" in found.describe()
+    assert found.to_json()["forward"]["mean_is_estimate"]
+    line = next(line for line in found.describe().splitlines() if line.startswith("A to B, mean"))
+    assert "≈ 0.1" in line
 
 
 def test_genus_and_holes_are_counted():

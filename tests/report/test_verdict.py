@@ -1,13 +1,18 @@
 """meshsdf.report.verdict: one sentence that says how far, where, and what became of topology."""
 
+from dataclasses import asdict
+
 import pytest
 
+from meshsdf.mesh.topology import Topology
 from meshsdf.report.verdict import sentence, topology_words
 
 from .trips import data_of
 
 CLOSED = {"euler_number": 2, "n_components": 1, "genus": 0, "n_boundary_loops": 0}
 OPEN = {"euler_number": 1, "n_components": 1, "genus": None, "n_boundary_loops": 1}
+BY_INDEX = Topology(True, 2, 1, 0, 12, False, 3)
+PINCHED = CLOSED | {"euler_number": 3, "genus": None, "topology": asdict(BY_INDEX)}
 
 
 def words(before: dict, after: dict, n: int = 0) -> tuple[bool, str]:
@@ -29,8 +34,8 @@ def test_the_same_counts_keep_the_topology():
         (CLOSED | {"euler_number": 0, "genus": 1}, 0, "Euler number 2 → 0, genus 0 → 1"),
         (CLOSED | {"n_components": 3}, 0, "components 1 → 3"),
         (OPEN, 0, "Euler number 2 → 1, boundary loops 0 → 1"),
-        (OPEN, 1, "counted by position: 1 vertex shares its place"),
-        (OPEN, 12, "counted by position: 12 vertices share places"),
+        (PINCHED, 0, "Euler number 2 → 3, counted by position); what came back is closed, Euler "),
+        (PINCHED, 0, "12 vertices share places: tools that merge them see Euler number 3, not clo"),
     ],
 )
 def test_every_count_that_changed_is_told(after, n, told):
