@@ -21,6 +21,8 @@ from .options import (
 )
 from .reports import check_reports, limit_words, report_option, write_reports
 
+LONGER = "a report also proves means and says where the error comes from: many times the work"
+
 
 @click.command(
     epilog="Example: meshsdf roundtrip bunny.obj --resolution 64,128 --report bunny.html"
@@ -103,6 +105,8 @@ def command(
     with console.stage("check"):
         found = check(loaded, self_intersections=False)
         choice = choose_sign(found, sign)
+    if reports:
+        console.say(LONGER)
     trip = roundtrip(
         loaded,
         resolutions,

@@ -23,6 +23,9 @@ REACH_DIAGONALS = 0.02  # the same where no voxel is known: so much of the diago
 AWAY = 4.0  # reaches: from where the picture is taken; what is farther out is not in it
 LIFT = 1e-6  # of the reach: where lines of sight start above the surface
 DIRECTIONS_AROUND, RINGS = 12, (0.95, 0.8, 0.6, 0.35)
+SIGHTS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]]) * 0.4
+"""Where lines of sight start, in reaches from the place along the surface and across."""
+BLOCKED = 10.0, 2.0  # what a direction loses if the place, or all that is around it, is hidden
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +97,14 @@ def _pair(
     pictures = []
     for i in range(2):
         view = render_mesh(
-            scenes[i], camera, width=WIDTH, height=HEIGHT, paint=paints[i], samples=SAMPLES
-        )
+            scenes[i],
+            camera,
+            width=WIDTH,
+            height=HEIGHT,
+            paint=paints[i],
+            samples=SAMPLES,
+            occlusion=False,
+        )  # a pocket that no sky lights would be black
         name = f"{names[i]}: {words[i]}"
         pictures.append(Picture(file_bytes(view), WIDTH, HEIGHT, name, name, _marker(pixels, i)))
     return tuple(pictures)
@@ -106,8 +115,8 @@ def line_of_sight(
 ) -> Vector3:
     """Choose the unit vector to the eye: the place is seen, and the way to its nearest point.
 
-    Of directions on the outer side of the witness's face that nothing blocks, the one that shows
-    the way at most length, and the face not too obliquely.
+    Of directions on the outer side of the witness's face that nothing blocks, there and around,
+    the one that shows the way at most length, and the face not too obliquely.
     """
     normal = normal if normal.any() else np.array([0.0, 0.0, 1.0])
     across = _upward(normal)
@@ -123,8 +132,11 @@ def line_of_sight(
     length = np.linalg.norm(way)
     sideways = np.linalg.norm(np.cross(directions, way / length if length > 0 else normal), axis=1)
     score = sideways + directions @ normal
-    origins = np.tile(witness + LIFT * reach * normal, (len(directions), 1))
-    score -= 10.0 * (rays(origins, directions).distance < AWAY * reach)
+    starts = witness + LIFT * reach * normal + reach * SIGHTS @ np.stack([across, along])
+    origins = np.tile(starts, (len(directions), 1))
+    lines = np.repeat(directions, len(starts), axis=0)
+    is_hidden = (rays(origins, lines).distance < AWAY * reach).reshape(len(directions), -1)
+    score -= BLOCKED[0] * is_hidden[:, 0] + BLOCKED[1] * is_hidden[:, 1:].mean(axis=1)
     return directions[int(score.argmax())]
 
 

@@ -12,7 +12,7 @@ from .notation import written
 LEAST_TOP = 1e-2
 """In voxels: the scale never ends lower, so that rounding errors do not shine."""
 
-MAP, DARKEST = "cividis", 0.16  # of the map: below, shadows could not be told from colours
+MAP, DARKEST = "magma_r", 0.82  # of the map: beyond, shadows could not be told from colours
 WIDTH, HEIGHT, MARGIN, BAR = 420, 38, 42, 12  # of the drawing, pixels
 N_STOPS = 25
 ROOM = 0.11  # of the bar, between two labels
@@ -24,6 +24,7 @@ class Scale:
 
     top: float
     unit: str = "voxels"
+    goes_on: bool = False  # there are larger distances, of the last colour
 
     def place(self, distances: Values) -> Values:
         """Where on the scale, from 0 to 1."""
@@ -58,13 +59,14 @@ class Scale:
         bar = f'<rect {place} fill="url(#colors-{name})"/>'
         labels = [written(tick) for tick in self.ticks]
         values = np.array([*self.ticks, self.top])
-        labels.append(f"{written(self.top, 'up', 3)} {self.unit}")
+        sign = "≥ " if self.goes_on else ""
+        labels.append(f"{sign}{written(self.top, 'up', 3)} {self.unit}")
         marks = "".join(
             f'<line x1="{x:.1f}" y1="{BAR + 2}" x2="{x:.1f}" y2="{BAR + 7}"/>'
             f'<text x="{x:.1f}" y="{BAR + 19}">{label}</text>'
             for x, label in zip(MARGIN + length * self.place(values), labels, strict=True)
         )
-        words = f"Colours from 0, dark, to {labels[-1]}, light, by square roots"
+        words = f"Colours from 0, light, to {labels[-1]}, dark, by square roots"
         return (
             f'<svg class="bar" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{words}">'
             f"<defs>{gradient}</defs>{bar}{marks}</svg>"
@@ -72,4 +74,4 @@ class Scale:
 
 
 def _colors(places: Values) -> np.ndarray:
-    return color_map(MAP)(DARKEST + (1.0 - DARKEST) * places)
+    return color_map(MAP)(DARKEST * places)

@@ -14,7 +14,8 @@ from ..mesh import Mesh
 from ..mesh.measures import face_normals
 from .roundtrip import RoundTrip, RoundTripRow
 
-INK, BLUE, ORANGE, GREY = "#222222", "#0072b2", "#d55e00", "#9a9a9a"  # Okabe and Ito 2008
+INK, GREY = "#222222", "#9a9a9a"
+LINES = "#0072b2", "#d55e00", "#009e73"  # Okabe and Ito 2008
 LIGHT = np.array([0.35, -0.6, 0.72])
 PNG_OPTIONS = {"dpi": 110, "metadata": {"Software": None}}
 
@@ -25,7 +26,7 @@ def draw_errors(trip: RoundTrip, path: Path, *, title: str) -> None:
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     rows = [row for row in trip.rows if row.comparison is not None]
-    for method, color in zip(trip.methods, (BLUE, ORANGE), strict=False):
+    for method, color in zip(trip.methods, LINES, strict=False):
         _plot_method(axes, [row for row in rows if row.method == method], color)
     rows = list({row.voxel_size: row for row in rows}.values())
     sizes = np.array([row.voxel_size for row in rows])

@@ -116,12 +116,12 @@ def render_comparison(
         return compare_markdown(data)
 
     def drawn() -> str:
-        from .heat_maps import pair_maps, pair_scale
+        from .heat_maps import pair_maps, pair_scales
         from .html import compare_page
 
-        scale, says = pair_scale(pair.comparison), words_of(data)
+        scales, says = pair_scales(pair.comparison), words_of(data)
         return compare_page(
-            data, pair_maps(pair.meshes, pair.comparison, scale, says, progress=progress)
+            data, pair_maps(pair.meshes, pair.comparison, scales, says, progress=progress)
         )
 
     return _rendered(names, formats, data, text, drawn)
@@ -145,12 +145,12 @@ def _rendered(
 
 
 def _page(trip: RoundTrip, mesh: Mesh, data: dict, progress: Progress) -> str:
-    from .heat_maps import common_scale, heat_maps
+    from .heat_maps import common_scales, heat_maps
     from .html import page
 
     shown = [i for i in data["last_rows"] if trip.rows[i].comparison is not None]
     if not shown:
         return page(data)
-    scale = common_scale([trip.rows[i] for i in shown])
-    maps = {i: heat_maps(mesh, trip.rows[i], scale, progress=progress) for i in shown}
+    scales = common_scales([trip.rows[i] for i in shown])
+    maps = {i: heat_maps(mesh, trip.rows[i], scales, progress=progress) for i in shown}
     return page(data, maps)

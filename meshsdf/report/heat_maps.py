@@ -1,7 +1,8 @@
 """Pictures of where two surfaces differ: both, painted with the distance between them.
 
 Every pixel shows the exact distance of what it sees to the other surface. One scale serves all
-pictures of a report; its colours follow square roots, for what matters spans powers of ten.
+whole views of a report, up to what 99 % of the area is within, and another one all close-ups, up
+to the largest distance; their colours follow square roots, for what matters spans powers of ten.
 """
 
 from collections.abc import Callable, Iterator
@@ -31,6 +32,10 @@ VIEWS = {
     "bottom": "from −y",
 }
 WIDTH, HEIGHT, SAMPLES = 480, 400, 2
+CLIPPED_AT = 99
+"""The percentile of the area at which the colours of whole views end: one worst place would leave
+all the rest in the colour of nothing."""
+
 LEAST_SHARE = 1e-6  # of the diagonal: as `LEAST_TOP`, where no voxel is known
 
 
@@ -49,7 +54,9 @@ class HeatMaps:
     Attributes
     ----------
     scale : Scale
-        The same for all rows of a report.
+        Of the whole views; the same for all rows of a report.
+    near_scale : Scale
+        Of the close-ups; the same for all rows of a report.
     sides : tuple of Side
         The mesh, and what came back.
     close_ups : tuple of CloseUp
@@ -57,18 +64,28 @@ class HeatMaps:
     """
 
     scale: Scale
+    near_scale: Scale
     sides: tuple[Side, ...]
     close_ups: tuple[CloseUp, ...]
 
 
-def common_scale(rows: list[RoundTripRow]) -> Scale:
-    """Return the scale that holds the largest distance of all rows."""
-    found = [row.comparison.in_voxels(row.comparison.distance.upper) for row in rows]
-    return Scale(float(max([LEAST_TOP, *found])))
+def common_scales(rows: list[RoundTripRow]) -> tuple[Scale, Scale]:
+    """Return the scales of whole views and of close-ups that serve all rows."""
+    tops = [[row.comparison.in_voxels(t) for t in _tops(row.comparison)] for row in rows]
+    far, all_of_it = (float(max([LEAST_TOP, *column])) for column in zip(*tops, strict=True))
+    return Scale(far, goes_on=far < all_of_it), Scale(all_of_it)
+
+
+def _tops(found: Comparison) -> tuple[float, float]:
+    """What 99 % of both areas are within, if that is known, and the largest distance."""
+    largest = float(found.distance.upper)
+    sides = found.forward_statistics, found.backward_statistics
+    known = [side.percentiles[CLIPPED_AT].upper for side in sides if side is not None]
+    return min(float(max(known, default=largest)), largest), largest
 
 
 def heat_maps(
-    mesh: Mesh, row: RoundTripRow, scale: Scale, *, progress: Progress = silent
+    mesh: Mesh, row: RoundTripRow, scales: tuple[Scale, Scale], *, progress: Progress = silent
 ) -> HeatMaps:
     """Draw a row that brought something back: both surfaces from six sides, and the worst places.
 
@@ -78,24 +95,25 @@ def heat_maps(
         What made the round trip.
     row : RoundTripRow
         With a comparison.
-    scale : Scale
-        From `common_scale`.
+    scales : pair of Scale
+        From `common_scales`.
     """
-    return pair_maps((mesh, row.surface), row.comparison, scale, ROUND_TRIP, progress=progress)
+    return pair_maps((mesh, row.surface), row.comparison, scales, ROUND_TRIP, progress=progress)
 
 
-def pair_scale(found: Comparison) -> Scale:
-    """Return the scale of two surfaces: in voxels, or in units of length where none is known."""
-    upper = float(found.distance.upper)
-    if found.voxel_size is None:
-        return Scale(max(LEAST_SHARE * found.diagonal, upper), "units")
-    return Scale(max(LEAST_TOP, found.in_voxels(upper)))
+def pair_scales(found: Comparison) -> tuple[Scale, Scale]:
+    """Return both scales of two surfaces: in voxels, or in units of length where none is known."""
+    tops, least, unit = _tops(found), LEAST_SHARE * found.diagonal, "units"
+    if found.voxel_size is not None:
+        tops, least, unit = [found.in_voxels(top) for top in tops], LEAST_TOP, "voxels"
+    far, all_of_it = (max(least, top) for top in tops)
+    return Scale(far, unit, goes_on=far < all_of_it), Scale(all_of_it, unit)
 
 
 def pair_maps(
     pair: tuple[Mesh, Mesh],
     found: Comparison,
-    scale: Scale,
+    scales: tuple[Scale, Scale],
     says: PairWords,
     *,
     progress: Progress = silent,
@@ -103,7 +121,8 @@ def pair_maps(
     """Draw two surfaces of which `compare` found something, called as ``says`` says."""
     unit = 1.0 if found.voxel_size is None else found.voxel_size
     # Each surface is painted with its distance to the other one
-    paints = [painter(ClosestPoint(other), unit, scale) for other in reversed(pair)]
+    others = [ClosestPoint(other) for other in reversed(pair)]
+    paints, near = ([painter(other, unit, scale) for other in others] for scale in scales)
     titles = (
         f"{says.starts[0]}: how far it is from {says.b_of_a}",
         f"{says.starts[1]}: how far it is from {says.a}",
@@ -122,7 +141,7 @@ def pair_maps(
             alt = f"{title}, {words}"
             views.append(Picture(file_bytes(picture), WIDTH, HEIGHT, words, alt))
         sides.append(Side(title, tuple(views)))
-    return HeatMaps(scale, tuple(sides), close_ups(pair, found, paints, says))
+    return HeatMaps(*scales, tuple(sides), close_ups(pair, found, near, says))
 
 
 def painter(

@@ -20,8 +20,8 @@ from .verdict import METHOD_WORDS
 
 # Stand-ins that matplotlib writes as they are; the page knows them by name
 INK, MUTED, RULE = "#010203", "#040506", "#070809"
-FIRST, SECOND = "#0a0b0c", "#0d0e0f"
-NAMES = {INK: "ink", MUTED: "muted", RULE: "rule", FIRST: "first", SECOND: "second"}
+FIRST, SECOND, THIRD = "#0a0b0c", "#0d0e0f", "#101112"
+NAMES = {INK: "ink", MUTED: "muted", RULE: "rule", FIRST: "first", SECOND: "second", THIRD: "third"}
 
 PER_BAR = 4  # thresholds of a distribution that make a bar of its histogram
 SIZE = 5.4, 3.7  # inches; letters of 10 points are then readable on a telephone as well
@@ -53,7 +53,7 @@ def errors_svg(data: dict) -> str:
         return ""
 
     def draw(axes) -> None:
-        for method, color in zip(data["methods"], (FIRST, SECOND), strict=False):
+        for method, color in zip(data["methods"], (FIRST, SECOND, THIRD), strict=False):
             name = f"{METHOD_WORDS[method]}, " if len(data["methods"]) > 1 else ""
             _method_lines(axes, [row for row in rows if row["method"] == method], color, name)
         _one_voxel(axes, rows)

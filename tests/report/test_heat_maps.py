@@ -14,7 +14,7 @@ from meshsdf.mesh import Mesh
 from meshsdf.mesh.primitives import box_mesh
 from meshsdf.report.close_up import HEIGHT, WIDTH, close_ups, line_of_sight
 from meshsdf.report.color_bar import LEAST_TOP, Scale
-from meshsdf.report.heat_maps import common_scale, painter
+from meshsdf.report.heat_maps import CLIPPED_AT, common_scales, painter
 from meshsdf.report.pair_words import ROUND_TRIP
 from meshsdf.spatial.closest_point import ClosestPoint
 from meshsdf.spatial.ray_hits import RayHits
@@ -58,7 +58,19 @@ def test_paint_is_the_colour_of_the_distance_to_the_other_surface():
 def test_one_scale_serves_all_rows_and_never_ends_too_low():
     rows = facts("box")[0].rows
     largest = max(row.comparison.distance.upper / row.voxel_size for row in rows)
-    assert common_scale(list(rows)).top == pytest.approx(largest)
+    whole, near = common_scales(list(rows))
+    assert near.top == pytest.approx(largest)
+    assert not near.goes_on
+    # The whole views end where 99 % of the area does, and say that there is more
+    within = max(
+        side.percentiles[CLIPPED_AT].upper / row.voxel_size
+        for row in rows
+        for side in (row.details.forward_statistics, row.details.backward_statistics)
+        if side is not None
+    )
+    assert LEAST_TOP <= whole.top == pytest.approx(within)
+    assert whole.goes_on
+    assert "≥ " in whole.bar("x")
 
 
 def test_the_eye_looks_where_nothing_blocks():
@@ -77,7 +89,7 @@ def test_the_eye_looks_where_nothing_blocks():
 def test_both_pictures_of_a_close_up_mark_the_same_two_places():
     trip, mesh, *_ = facts("box")
     row = trip.rows[1]
-    scale = common_scale([row])
+    _, scale = common_scales([row])
     paints = [painter(ClosestPoint(m), row.voxel_size, scale) for m in (row.surface, mesh)]
     found = close_ups((mesh, row.surface), row.comparison, paints, ROUND_TRIP)
     assert [close_up.at for close_up in found] == ["forward", "backward"]

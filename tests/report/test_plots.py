@@ -28,6 +28,17 @@ def test_errors_are_drawn_for_every_method_with_the_fitted_order():
     assert "resolution" in words
 
 
+def test_every_method_has_its_line():
+    data = data_of("box", methods=(*BOTH, "surface-nets"))
+    svg = errors_svg(data)
+    words = "".join(ElementTree.fromstring(svg).itertext())
+    for method in ("marching cubes", "dual contouring", "surface nets"):
+        for line in ("largest", "mean"):
+            assert f"{method}, {line}" in words
+    for color in ("first", "second", "third"):
+        assert f"var(--{color})" in svg
+
+
 def test_nothing_is_drawn_where_there_is_nothing_to_see():
     assert errors_svg(data_of("box", resolutions=(8,))) == ""
     empty = data_of("plate", resolutions=(6, 7))

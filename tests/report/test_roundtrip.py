@@ -9,6 +9,7 @@ from meshsdf.mesh.measures import face_areas
 from meshsdf.mesh.primitives import icosphere
 from meshsdf.report.error_budget import error_budget
 from meshsdf.report.roundtrip import roundtrip
+from meshsdf.report.words import roundtrip_table
 from meshsdf.sdf import mesh_to_band
 from meshsdf.spatial.closest_point import ClosestPoint
 from meshsdf.surface import marching_cubes
@@ -29,6 +30,18 @@ def test_details_are_measured_only_where_asked_and_of_the_finest_row():
     assert fine.details.sharp_edges.n_edges == 12
     assert set(fine.seconds) == {"distance", "surface", "compare", "details"}
     assert plain.comparison.distance == fine.comparison.distance
+    # What a report needs beside is no part of the time told
+    assert fine.trip_seconds == pytest.approx(sum(fine.seconds.values()) - fine.seconds["details"])
+
+
+def test_the_table_prints_what_is_proved_and_marks_estimates():
+    plain = roundtrip(turned_box(), [12])
+    proved = facts("box")[0]
+    row = proved.rows[1].comparison
+    for name in ("mean", "rms"):
+        assert getattr(row.forward_statistics, name).contains(getattr(row.forward, name))
+    assert roundtrip_table(plain).count("≈") == 2
+    assert "≈" not in roundtrip_table(proved)
 
 
 def mean_of(surface: Mesh) -> float:
