@@ -1,5 +1,7 @@
 """``meshsdf convert``: a mesh, or another volume, to a volume."""
 
+from pathlib import Path
+
 import click
 from click.core import ParameterSource
 
@@ -66,7 +68,10 @@ def command(context: click.Context, source: str, out: str, as_json: bool, **opti
     holds is copied; what OUT has no place for is told and refused, unless --force accepts it.
     """
     from ..io import kind_of
+    from ..io.registry import checked_input
 
+    if Path(source).is_dir():
+        checked_input(source)
     kind = kind_of(source)
     given = {name for name in options if _is_given(context, name)}
     _check_options(kind, out, given, options)

@@ -2,6 +2,7 @@
 
 import click
 
+from ..errors import IoError
 from .console import YES, Console, file_size, plural
 from .options import json_option, path
 
@@ -17,7 +18,12 @@ def command(file: str, as_json: bool) -> int:
         return click.get_current_context().invoke(info, texture=file, as_json=as_json)
     console = Console("info", as_json=as_json)
     from ..io import check_input, kind_of, probe_samples, probe_volume, stored_bytes
+    from ..io.registry import checked_input, suffix_of, suffixes
 
+    checked_input(file)
+    if suffix_of(file) and suffix_of(file) not in suffixes():
+        what = f"nothing is known of files with suffix {suffix_of(file)!r}"
+        raise IoError(what, f"file {file}", f"use one of {', '.join((*suffixes(), '.mtex'))}")
     check_input(file)
     n_bytes = stored_bytes(file)
     facts = probe_samples(file) if file.lower().endswith((".npz", ".ply")) else None

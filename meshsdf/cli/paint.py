@@ -17,7 +17,7 @@ from .options import PositiveNumber, path
 
 PROJECT = ".mtex"
 GREY = (0.578, 0.578, 0.578, 1.0)  # linear; #c8c8c8 on a screen
-PIP_LINE = "pip install 'meshsdf[paint]'"
+PIP_LINE = "pip install '.[paint]', in the folder that meshsdf was installed from"
 EXTRA = ("starlette", "uvicorn", "websockets")
 BELOW = ("h11", "anyio")  # what those stand on
 REDIRECT = """<!doctype html><meta charset="utf-8"><meta name="referrer" content="no-referrer">

@@ -142,13 +142,17 @@ def procedural(mesh: str, out: str, kind: str, parameters, **options) -> int:
 def _list(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     if not value:
         return
-    from ..texture.procedural import PROCEDURALS, parameters_of
+    from ..texture.procedural import PROCEDURALS, lengths_for, parameters_of
     from ..texture.sdf_patterns import ON_SHAPE
 
     for kind in [*sorted(PROCEDURALS), *sorted(ON_SHAPE)]:
-        click.echo(kind)
+        click.echo(kind.replace("_", "-") if kind in ON_SHAPE else kind)
+        lengths = lengths_for(kind, 1.0)
         for one in parameters_of(kind):
-            click.echo(f"  {one.name}={_text(one.default)}  {one.meaning}")
+            meaning = one.meaning
+            if one.name in lengths:
+                meaning += f"; if not given, {lengths[one.name]:g} of the mesh's longest side"
+            click.echo(f"  {one.name}={_text(one.default)}  {meaning}")
     ctx.exit()
 
 

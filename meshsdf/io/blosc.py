@@ -12,7 +12,7 @@ from .vdb_stream import ByteArray, UnsuitedError
 
 Spans = Int64[np.ndarray, "k 2"]
 
-PIP_LINE = "pip install 'meshsdf[blosc]'"
+PIP_LINE = "pip install '.[blosc]', in the folder that meshsdf was installed from"
 
 
 def blosc_decode(window: ByteArray, frames: Spans, target: ByteArray, places: Spans) -> None:

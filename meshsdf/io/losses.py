@@ -14,7 +14,7 @@ from ..grid import Grid, NarrowBand
 from .registry import Format, format_of
 from .warn import Warn
 
-FIX = "--force (force=True) accepts the loss; .npz and .zarr hold all that a volume has"
+FIX = "--force accepts the loss; .npz and .zarr hold all that a volume has"
 
 _MOST_NAMES = 20  # in one sentence
 _ASKED = {"closest": "closest faces and barycentrics", "half": "16-bit floats"}

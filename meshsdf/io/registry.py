@@ -125,6 +125,11 @@ def suffixes(kind: Kind | None = None) -> tuple[str, ...]:
     return tuple(s for f in FORMATS if kind in (None, f.kind) for s in f.suffixes)
 
 
+def able_suffixes(kind: Kind, task: str) -> tuple[str, ...]:
+    """Return the suffixes of the formats that can do something: "reader", "writer", "prober"."""
+    return tuple(s for f in FORMATS if f.kind == kind and getattr(f, task) for s in f.suffixes)
+
+
 def suffix_of(path: str | os.PathLike) -> str:
     """Return the suffix that names the format of a file, in lower case: ``.npz``, ``.zarr.zip``."""
     words = Path(path).suffixes[-2:]
@@ -161,8 +166,9 @@ def format_of(path: str | os.PathLike, kind: Kind | None = None, task: str = "re
     if not suffix:
         what = f"the name has no suffix, so the format of the {kind or 'file'} is unknown"
     others = [f.kind for f in FORMATS if suffix in f.suffixes and f.kind != kind]
-    near = difflib.get_close_matches(suffix, known, n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]}?" if near and suffix not in suffixes() else ""
+    # Without the dots, which all have: .png is nothing like .ply
+    near = difflib.get_close_matches(suffix[1:], [one[1:] for one in known], n=1, cutoff=0.6)
+    hint = f"; did you mean .{near[0]}?" if near and suffix not in suffixes() else ""
     if others and kind is not None:
         what = f"a {kind} with suffix {suffix!r} cannot be {verb}: that is a {others[0]}"
     error = OutputError if task == "writer" else IoError

@@ -19,6 +19,7 @@ from .atomic import check_output
 from .meshes import write_mesh
 from .mtl import material_image
 from .pictures import write_picture
+from .registry import able_suffixes
 from .vdb_texture import write_vdb_texture
 from .warn import Warn, ignore
 
@@ -50,6 +51,10 @@ PLAIN = Layout()
 def check_texture_output(path: str | os.PathLike, force: bool = False) -> None:
     """Refuse a place that `write_texture` could not write to; IoError as `check_output`."""
     suffix = Path(path).suffix.lower()
+    known = (*able_suffixes("mesh", "writer"), *VOLUMES, *PICTURES)
+    if suffix not in known:
+        what = f"a texture with suffix {suffix!r} cannot be written"
+        raise OutputError(what, f"output {path}", f"use one of {', '.join(known)}")
     check_output(path, force, kind=None if suffix in (*PICTURES, *VOLUMES) else "mesh")
     for place in companions(path):
         if place.exists() and not force:

@@ -7,7 +7,7 @@ import numpy as np
 from .vdb_stream import UnsuitedError
 from .zarr_zip import Folder
 
-PIP_LINE = "pip install 'meshsdf[scale]'"
+PIP_LINE = "pip install '.[scale]', in the folder that meshsdf was installed from"
 
 CODECS = frozenset({"bytes", "transpose", "gzip", "zstd", "blosc", "crc32c", "sharding_indexed"})
 """Those that unpack numbers and do nothing else; the package knows some that run code."""

@@ -191,7 +191,7 @@ def check_header(path: Path) -> None:
         what = f"the project cannot be read: {error.strerror}"
         raise TextureError(what, where, "check the path and its permissions") from None
     if head[: len(MAGIC)] != MAGIC[: len(head)]:
-        what = f"the file is no project: it begins with {head[:8]!r}"
+        what = "the file is no project: it does not begin as projects do"
         raise TextureError(what, where, "open a .mtex file, or create a project")
     if len(head) < HEADER:
         what = f"the project is cut off after {len(head)} bytes"

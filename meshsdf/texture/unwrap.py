@@ -28,7 +28,7 @@ def unwrap(mesh: Mesh, size: int, time_limit: float) -> Mesh:
         xatlas is not installed, takes longer than ``time_limit`` seconds, or fails.
     """
     if importlib.util.find_spec("xatlas") is None:
-        fix = "pip install 'meshsdf[unwrap]', or use method=\"squares\""
+        fix = "pip install '.[unwrap]' in meshsdf's folder, or lay out in squares"
         raise TextureError("xatlas is not installed", WHERE, fix)
     given = io.BytesIO()
     np.savez(given, vertices=mesh.vertices, faces=mesh.faces, size=size)

@@ -294,3 +294,32 @@ def test_vertex_colours_lie_where_the_texture_says():
     bake(texture, texture.add_layer(), procedural("stripes", scale=1.0))
     colored = vertex_colored(texture, mesh)
     assert np.ptp(colored.vertex_colors[:, 0]) > 0.3
+
+
+def test_the_list_tells_lengths_as_they_are_without_a_parameter(cli):
+    lines = cli("texture", "procedural", "--list").out.splitlines()
+    assert "edge-wear" in lines
+    (reach,) = (line for line in lines if line.startswith("  reach=0.02"))
+    assert reach.endswith("if not given, 0.02 of the mesh's longest side")
+    scales = [line for line in lines if line.startswith("  scale=")]
+    assert scales
+    assert all(line.endswith("if not given, 1 of the mesh's longest side") for line in scales)
+
+
+def test_every_suffix_that_a_command_takes_is_named(cli, mesh, tmp_path):
+    made = tmp_path / "a.mtex"
+    made.write_bytes(b"")
+    outcome = cli("texture", "export", made, "--to", tmp_path / "x.gif")
+    assert outcome.code == 2
+    assert ".obj, .ply, .stl, .off, .glb, .vdb, .png, .jpg, .jpeg, .exr" in outcome.err
+    assert "did you mean" not in outcome.err
+    (tmp_path / "x.png").write_bytes(b"")
+    outcome = cli("info", tmp_path / "x.png")
+    assert outcome.code == 3
+    assert ".obj" in outcome.err
+    assert ".mtex" in outcome.err
+    for name in ("x.foo", "x.png", "x.fbx"):
+        assert "did you mean" not in cli("convert", mesh, tmp_path / name).err
+    folder = cli("convert", tmp_path, tmp_path / "out.vdb")
+    assert folder.code == 3
+    assert "this is a folder, not a file" in folder.err

@@ -111,4 +111,4 @@ def test_without_numcodecs_blosc_is_written_and_read_but_for_other_codecs(tmp_pa
     assert_same_band(read_vdb(tmp_path / "a.vdb"), band)
     with pytest.raises(IoError, match="packed with Blosc, which needs the package") as error:
         read_vdb(tmp_path / "zstd.vdb")
-    assert error.value.fix == "pip install 'meshsdf[blosc]'"
+    assert error.value.fix.startswith("pip install '.[blosc]'")

@@ -349,7 +349,7 @@ def test_without_the_package_other_codecs_are_named_with_the_way_to_get_it(tmp_p
     monkeypatch.setitem(sys.modules, "zarr", None)
     with pytest.raises(IoError, match="packed with bytes, zstd, which needs the package") as error:
         read_zarr(path)
-    assert error.value.fix == "pip install 'meshsdf[scale]'"
+    assert error.value.fix.startswith("pip install '.[scale]'")
     write_zarr(tmp_path / "b.zarr", band)
     assert_equal(read_zarr(tmp_path / "b.zarr"), band)
 

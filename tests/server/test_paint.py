@@ -188,7 +188,7 @@ def test_without_the_extra_there_is_the_line_that_installs_it(mesh, tmp_path):
     )  # fmt: skip
     assert done.returncode == 3
     assert "painting needs the package h11, which is not installed" in done.stderr
-    assert "pip install 'meshsdf[paint]'" in done.stderr
+    assert "pip install '.[paint]'" in done.stderr
     assert not mesh.with_suffix(".mtex").exists()
 
 
