@@ -135,7 +135,9 @@ def export(
                 with_mesh.add(mesh_beside(out))
             n_bytes = Path(out).stat().st_size
             written.append({"output": out, "bytes": n_bytes} | facts)
-            console.result(f"{out}: {words_of(facts)}, {file_size(n_bytes)}", is_last=False)
+            mesh_words = f", on the mesh {facts['mesh']}" if "mesh" in facts else ""
+            words = f"{out}: {words_of(facts)}{mesh_words}, {file_size(n_bytes)}"
+            console.result(words, is_last=False)
     seconds = console.timings("load", "export")
     facts = {"input": texture, "written": written, "seconds": seconds}
     console.json(facts | {"warnings": console.warnings})

@@ -198,8 +198,7 @@ def words_of(facts: dict[str, Any]) -> str:
         "squares": "a square for every two faces",
     }[facts["atlas"]]
     why = f" ({facts['without_xatlas']})" if facts.get("without_xatlas") else ""
-    mesh = f", on the mesh {facts['mesh']}" if facts.get("mesh") else ""
-    return f"{words} of {facts['size']} x {facts['size']} pixels, {by}{why}{mesh}"
+    return f"{words} of {facts['size']} x {facts['size']} pixels, {by}{why}"
 
 
 def _image_facts(laid: Atlas, layout: Layout) -> dict[str, Any]:
