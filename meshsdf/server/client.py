@@ -356,7 +356,7 @@ class _Connector:
             from websockets.sync.client import connect
         except ImportError:
             what = "painting from Python needs the package websockets"
-            raise ServerError(what, WHERE, "pip install 'meshsdf[paint]'") from None
+            raise ServerError(what, WHERE, "pip install '.[paint]'") from None
         self._connect = connect
         self.closed = ConnectionClosed
         self.faults = (WebSocketException,)

@@ -363,7 +363,7 @@ def test_altered_frames_in_the_middle_of_a_session_do_not_stop_the_server(served
 
 def test_without_websockets_a_painter_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "websockets.sync.client", None)
-    with pytest.raises(ServerError, match=r"pip install 'meshsdf\[paint\]'"):
+    with pytest.raises(ServerError, match=r"pip install '.\[paint\]'"):
         Painter("http://127.0.0.1:9/#t=x")
 
 
