@@ -105,6 +105,7 @@ class Project:
         resolution: Number | None = None,
         texel: Number | None = None,
         base: str = "srgb8",
+        divides: bool = False,
         budget: int = BUDGET,
         warn: Warn = unheard,
         progress: Progress = silent,
@@ -117,7 +118,7 @@ class Project:
             Of a file that is not there yet, ``.mtex`` by custom.
         mesh : Mesh
             Its vertices and faces are kept in the project.
-        resolution, texel, base
+        resolution, texel, base, divides
             As `VolumeTexture.around` takes them.
         budget : int
             Bytes for undoing, see `History`.
@@ -131,7 +132,7 @@ class Project:
         """
         path = Path(path)
         texture = VolumeTexture.around(
-            mesh, resolution=resolution, texel=texel, base=base, progress=progress
+            mesh, resolution=resolution, texel=texel, base=base, divides=divides, progress=progress
         )
         lock = ProjectLock(path)
         try:

@@ -73,7 +73,7 @@ class Octree:
         *,
         texel: Number | None = None,
         resolution: Number | None = None,
-        divides: bool = True,
+        divides: bool = False,
         progress: Progress = silent,
     ) -> "Octree":
         """Find the texels that a mesh needs.
@@ -88,7 +88,8 @@ class Octree:
             Or: texels along the longest side of the mesh's box; 512 if neither is given.
         divides : bool
             Whether faces that look the same way, are apart and need the same texels get texels of
-            their own; if not, they share them.
+            their own; if not, they share them. How they are divided depends on the whole surface:
+            of a divided octree bricks may change far from where a mesh was edited.
 
         Raises
         ------

@@ -95,7 +95,8 @@ def transfer(
     if not (np.isfinite(reach) and reach > 0):
         what = f"a reach of {reach} texels makes no sense"
         raise TextureError(what, "transfer(reach=...)", "give a positive number")
-    octree = Octree.around(new_mesh, texel=texture.octree.texel)
+    known = texture.octree
+    octree = Octree.around(new_mesh, texel=known.texel, divides=known.is_divided)
     new = VolumeTexture(octree, base=texture.base)
     new.surface = new_mesh
     change = MeshChange.between(texture.surface, new_mesh)

@@ -79,10 +79,16 @@ class VolumeTexture:
         resolution: Number | None = None,
         texel: Number | None = None,
         base: str = "srgb8",
+        divides: bool = False,
         progress: Progress = silent,
     ) -> "VolumeTexture":
-        """An empty texture with the texels that a mesh needs; errors as `Octree.around`."""
-        octree = Octree.around(mesh, resolution=resolution, texel=texel, progress=progress)
+        """An empty texture with the texels that a mesh needs; arguments, errors as `Octree.around`.
+
+        ``divides=True`` is for parallel plates, folds and shells that lie closer than two texels.
+        """
+        octree = Octree.around(
+            mesh, resolution=resolution, texel=texel, divides=divides, progress=progress
+        )
         texture = cls(octree, base=base)
         texture.surface = mesh
         return texture

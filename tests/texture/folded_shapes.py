@@ -66,7 +66,7 @@ def boxes(n=2, gap=0.2):
 
 def baked(mesh, owner, **options):
     """A texture with every face's owner in its colour."""
-    texture = VolumeTexture.around(mesh, texel=1.0, **options)
+    texture = VolumeTexture.around(mesh, texel=1.0, divides=True, **options)
     layer = texture.add_layer()
     bake(texture, layer, lambda points, faces: COLORS[owner[faces]])
     return texture, layer

@@ -43,8 +43,10 @@ def test_no_texel_of_two_parallel_plates_mixes_their_colours(gap, z):
 
 def test_each_of_two_plates_has_the_texels_it_would_have_alone():
     for gap, z, tilt in ((0.5, 0.1, 0.0), (0.2, 0.8, 0.0), (0.3, 0.4, 0.11)):
-        octree = Octree.around(plates(gap, z, tilt)[0], texel=1.0)
-        alone = [Octree.around(plate(height, tilt), texel=1.0) for height in (z, z + gap)]
+        octree = Octree.around(plates(gap, z, tilt)[0], texel=1.0, divides=True)
+        alone = [
+            Octree.around(plate(height, tilt), texel=1.0, divides=True) for height in (z, z + gap)
+        ]
         assert octree.n_texels(0) == sum(one.n_texels(0) for one in alone)
 
 
@@ -66,7 +68,7 @@ def test_the_turns_of_a_spiral_keep_their_shades():
     curve = np.stack([radius * np.cos(t), radius * np.sin(t)], axis=1)
     mesh, at = strip(curve, 20.0, np.arange(599))
     shade = np.stack([at / 600, 1 - at / 600, 0 * at + 0.2, 0 * at + 1.0], axis=1)
-    texture = VolumeTexture.around(mesh, texel=1.0)
+    texture = VolumeTexture.around(mesh, texel=1.0, divides=True)
     bake(texture, texture.add_layer(), lambda points, faces: shade[faces].astype(np.float32))
     on = sample_surface(mesh, 20_000, seed=3)
     off = np.abs(texture.colors(on.points, on.normals) - shade[on.face_index]).max(axis=1)
@@ -85,7 +87,7 @@ def test_nested_boxes_do_not_mix_along_their_edges():
 
 def test_refining_keeps_plates_apart():
     mesh, owner = plates(0.5, 0.3, 0.05)
-    texture = VolumeTexture.around(mesh, texel=0.25)
+    texture = VolumeTexture.around(mesh, texel=0.25, divides=True)
     layer = texture.add_layer()
     bake(texture, layer, lambda points, faces: COLORS[owner[faces]], level=2)
     on = sample_surface(mesh, 10_000, seed=5)
@@ -96,7 +98,10 @@ def test_refining_keeps_plates_apart():
 
 def tables_equal(mesh, **size):
     """The tables are the same, byte for byte, whether sheets may be divided or not."""
-    octree, plain = Octree.around(mesh, **size), Octree.around(mesh, divides=False, **size)
+    octree, plain = (
+        Octree.around(mesh, divides=True, **size),
+        Octree.around(mesh, divides=False, **size),
+    )
     for own, other in zip(octree.tables, plain.tables, strict=True):
         assert_array_equal(own, other)
         assert np.asarray(own).dtype == np.asarray(other).dtype
@@ -130,7 +135,7 @@ def test_plates_a_hair_apart_share_their_texels():
 @pytest.mark.parametrize("name", ["armadillo.obj", "Duck.glb", "cow.obj", "camelhead.off"])
 def test_sheets_of_real_models_have_colours_of_their_own(name):
     mesh = read_mesh(model(name))
-    texture = VolumeTexture.around(mesh, resolution=256)
+    texture = VolumeTexture.around(mesh, resolution=256, divides=True)
     octree, layer = texture.octree, texture.add_layer()
     on = sample_surface(mesh, 400_000, seed=6)
     nodes = on.points / octree.texel

@@ -92,11 +92,11 @@ def test_layers_over_one_another_keep_plates_apart():
 def test_colours_of_a_mesh_and_of_functions_come_to_the_right_plate():
     mesh, owner = plates(0.2, 0.4)
     colored = Mesh(mesh.vertices, mesh.faces, vertex_colors=COLORS[np.repeat([0, 1], 4)])
-    texture = VolumeTexture.around(mesh, texel=1.0)
+    texture = VolumeTexture.around(mesh, texel=1.0, divides=True)
     bake(texture, texture.add_layer(), MeshSource(colored))
     for place, color in zip(sides(mesh, owner), COLORS, strict=False):
         assert off(texture, place, color) <= STEP
-    lazy = VolumeTexture.around(mesh, texel=1.0)
+    lazy = VolumeTexture.around(mesh, texel=1.0, divides=True)
     add_procedural(lazy, "by height", lambda points, feet: COLORS[(feet[:, 2] > 0.5).astype(int)])
     for place, color in zip(sides(mesh, owner), COLORS, strict=False):
         assert off(lazy, place, color) <= STEP
@@ -104,7 +104,7 @@ def test_colours_of_a_mesh_and_of_functions_come_to_the_right_plate():
 
 def test_feet_are_the_nearest_places_of_the_own_plate():
     mesh, owner = plates(0.5, 0.3)
-    texture = VolumeTexture.around(mesh, texel=1.0)
+    texture = VolumeTexture.around(mesh, texel=1.0, divides=True)
     entries = np.arange(texture.octree.level_first[1], dtype=np.int32)
     points, _ = texture.places(entries)
     feet, faces = texture.feet(entries)
@@ -115,13 +115,13 @@ def test_feet_are_the_nearest_places_of_the_own_plate():
 
 
 def test_a_store_gives_the_tables_back():
-    octree = Octree.around(plates(0.3, 0.4, 0.1)[0], texel=1.0)
+    octree = Octree.around(plates(0.3, 0.4, 0.1)[0], texel=1.0, divides=True)
     arrays = octree_arrays(octree)
     again = octree_of_arrays(octree.texel, arrays)
     for own, other in zip(octree.tables, again.tables, strict=True):
         assert_array_equal(own, other)
     assert_array_equal(octree.face_parts, again.face_parts)
-    undivided = octree_arrays(Octree.around(plate(0.4), texel=1.0))
+    undivided = octree_arrays(Octree.around(plate(0.4), texel=1.0, divides=True))
     assert set(arrays) - set(undivided) == {"parts", "texel_parts", "face_parts"}
 
 
@@ -160,7 +160,7 @@ def test_one_thread_and_three_give_the_same_bytes(monkeypatch):
     for threads in (1, 3):
         monkeypatch.setattr(parallel, "n_threads", lambda threads=threads: threads)
         monkeypatch.setattr(octree_levels, "n_threads", lambda threads=threads: threads)
-        made.append(Octree.around(mesh, texel=1.0))
+        made.append(Octree.around(mesh, texel=1.0, divides=True))
     for own, other in zip(made[0].tables, made[1].tables, strict=True):
         assert_array_equal(own, other)
 
@@ -191,6 +191,6 @@ def test_a_vdb_file_has_every_texel_and_no_mixed_colour(tmp_path):
     active = np.unpackbits(colors.active.view(np.uint8), bitorder="little").view(bool)
     values = np.asarray(colors.values[:]).reshape(-1, 3)[active]
     # Both plates lie in one layer of cells
-    assert len(values) == Octree.around(plate(0.3), texel=1.0).n_texels(0)
+    assert len(values) == Octree.around(plate(0.3), texel=1.0, divides=True).n_texels(0)
     off = np.abs(values[:, None] - COLORS[:2, :3]).max(axis=2).min(axis=1)
     assert off.max() <= STEP
