@@ -11,6 +11,7 @@ import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import IoError, OutputError
@@ -89,22 +90,12 @@ def atomic_write(path: str | os.PathLike, force: bool = False) -> Iterator[Path]
         As `check_output`, which runs first; or the disk is full. Whatever is raised inside the
         block, KeyboardInterrupt too, removes the temporary file and leaves the old one intact.
     """
-    check_output(path, force)
-    target = _target(path)
-    where = f"output {path}"
-    temporary = target.with_name(f".meshsdf-{secrets.token_hex(8)}{target.suffix}")
-    try:
+    with _beside(path, force) as place:
         # 0o666 lets the user's umask decide, as for any other new file.
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-        yield temporary
-        _flush(temporary)
-        _place(temporary, target, force, where)
-    except OSError as error:
-        raise _explained(error, target.parent, where) from error
-    finally:
-        # Gone already when it was renamed.
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+        os.close(os.open(place.temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        yield place.temporary
+        _flush(place.temporary)
+        _place(place.temporary, place, force)
 
 
 @contextmanager
@@ -126,19 +117,11 @@ def atomic_folder(path: str | os.PathLike, force: bool = False) -> Iterator[Path
     IoError
         As `atomic_write`.
     """
-    check_output(path, force)
-    target = _target(path)
-    where = f"output {path}"
-    temporary = target.with_name(f".meshsdf-{secrets.token_hex(8)}{target.suffix}")
-    try:
-        os.mkdir(temporary)
-        yield temporary
-        _flush_all(temporary)
-        _place_folder(temporary, target, force, where)
-    except OSError as error:
-        raise _explained(error, target.parent, where) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+    with _beside(path, force) as place:
+        os.mkdir(place.temporary)
+        yield place.temporary
+        _flush_all(place.temporary)
+        _place_folder(place, force)
 
 
 @contextmanager
@@ -160,19 +143,12 @@ def atomic_path(path: str | os.PathLike, force: bool = False) -> Iterator[Path]:
     IoError
         As `atomic_write`.
     """
-    check_output(path, force)
-    target = _target(path)
-    where = f"output {path}"
-    folder = target.with_name(f".meshsdf-{secrets.token_hex(8)}")
-    try:
-        os.mkdir(folder)
-        yield folder / target.name
-        _flush(folder / target.name)
-        _place(folder / target.name, target, force, where)
-    except OSError as error:
-        raise _explained(error, target.parent, where) from error
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
+    with _beside(path, force) as place:
+        os.mkdir(place.temporary)
+        file = place.temporary / place.target.name
+        yield file
+        _flush(file)
+        _place(file, place, force)
 
 
 def write_text(path: str | os.PathLike, text: str, *, force: bool = False) -> None:
@@ -194,6 +170,35 @@ def make_folder(path: str | os.PathLike) -> Path:
             f"the folder cannot be made: {error.strerror}", f"folder {path}", "name another folder"
         ) from error
     return Path(path)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where something is to be, where it is made, and how errors call it."""
+
+    target: Path
+    temporary: Path
+    where: str
+
+
+@contextmanager
+def _beside(path: str | os.PathLike, force: bool) -> Iterator[_Place]:
+    """Check the output; what is made beside it goes, however the block ends, if it is still there.
+
+    Errors of the system are explained.
+    """
+    check_output(path, force)
+    target, where = _target(path), f"output {path}"
+    temporary = target.with_name(f".meshsdf-{secrets.token_hex(8)}{target.suffix}")
+    try:
+        yield _Place(target, temporary, where)
+    except OSError as error:
+        raise _explained(error, target.parent, where) from error
+    finally:
+        if temporary.is_dir():
+            shutil.rmtree(temporary, ignore_errors=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def _target(path: str | os.PathLike) -> Path:
@@ -242,8 +247,9 @@ def _check_old_folder(target: Path, where: str) -> None:
         raise OutputError(what, where, "choose another name")
 
 
-def _place_folder(temporary: Path, target: Path, force: bool, where: str) -> None:
+def _place_folder(place: _Place, force: bool) -> None:
     """Give the temporary folder its final name; without ``force``, only if that is still free."""
+    temporary, target = place.temporary, place.target
     aside = temporary.with_name(f"{temporary.name}-old")
     try:
         if force and target.exists():
@@ -253,7 +259,7 @@ def _place_folder(temporary: Path, target: Path, force: bool, where: str) -> Non
         if aside.exists() and not target.exists():
             os.rename(aside, target)
         if getattr(error, "errno", None) in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
-            raise _exists(where) from None
+            raise _exists(place.where) from None
         raise
     if aside.is_dir():
         shutil.rmtree(aside, ignore_errors=True)
@@ -261,23 +267,24 @@ def _place_folder(temporary: Path, target: Path, force: bool, where: str) -> Non
         aside.unlink(missing_ok=True)
 
 
-def _place(temporary: Path, target: Path, force: bool, where: str) -> None:
-    """Give the temporary file its final name; without ``force``, only if that is still free."""
+def _place(file: Path, place: _Place, force: bool) -> None:
+    """Give the file its final name; without ``force``, only if that is still free."""
+    target = place.target
     if force:
         if target.exists():
-            os.chmod(temporary, stat.S_IMODE(target.stat().st_mode))
-        os.replace(temporary, target)
+            os.chmod(file, stat.S_IMODE(target.stat().st_mode))
+        os.replace(file, target)
     else:
         try:
             # A link fails when the name was taken meanwhile; a rename would overwrite.
-            os.link(temporary, target)
+            os.link(file, target)
         except FileExistsError:
-            raise _exists(where) from None
+            raise _exists(place.where) from None
         except OSError as error:
             if error.errno not in _NO_LINKS:
                 raise
             check_output(target, force)
-            os.replace(temporary, target)
+            os.replace(file, target)
     with suppress(OSError):  # some file systems cannot flush a folder
         folder = os.open(target.parent, os.O_RDONLY)
         try:
