@@ -9,13 +9,12 @@ outside, and the arc between two of them leads *to* the crossing in the earlier 
 import numpy as np
 from numba import njit
 
+from .bits import count_bits, lowest_bit
 from .marching_cubes import (
     NONE,
     ONE,
     corner_words,
-    count_bits,
     crossing,
-    lowest_bit,
     mixed_cells,
     node_value,
     pattern_of,

@@ -13,9 +13,10 @@ coordinates of a line come in this order, and so on a node the slope of the face
 import numpy as np
 from numba import njit
 
+from .bits import count_bits
 from .brick_lookup import find_brick
 from .crossings import edge_height
-from .marching_cubes import NONE, ONE, count_bits
+from .marching_cubes import NONE, ONE
 
 
 @njit(cache=True, nogil=True)

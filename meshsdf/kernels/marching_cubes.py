@@ -14,6 +14,8 @@ brick or code at offset (x, y, z) from brick w; ``near[w, 0] == w``.
 import numpy as np
 from numba import njit
 
+from .bits import count_bits, lowest_bit
+
 NO_DATA = -3
 
 ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
@@ -72,23 +74,6 @@ def classify_bricks(values, level, start, stop, inside, valid):
                 missing |= np.uint64(row[bit] != row[bit]) << np.uint64(bit)
             inside[w, i] = below
             valid[w, i] = ~missing
-
-
-@njit(cache=True, nogil=True)
-def count_bits(word):
-    """Population count by halving; the compiler turns it into one instruction."""
-    word = word - ((word >> ONE) & np.uint64(0x5555555555555555))
-    word = (word & np.uint64(0x3333333333333333)) + (
-        (word >> np.uint64(2)) & np.uint64(0x3333333333333333)
-    )
-    word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
-    return np.int64((word * FIRST) >> ROW)
-
-
-@njit(cache=True, nogil=True)
-def lowest_bit(word):
-    """Position of the lowest set bit of a word that is not zero."""
-    return count_bits((word & (~word + ONE)) - ONE)
 
 
 @njit(cache=True, nogil=True)

@@ -21,7 +21,8 @@ Of ``twice`` and ``first`` only entries whose ``used`` is not 0 are set.
 import numpy as np
 from numba import njit
 
-from .marching_cubes import ALL, NONE, ONE, count_bits, crossing, lowest_bit, pattern_of
+from .bits import count_bits, lowest_bit
+from .marching_cubes import ALL, NONE, ONE, crossing, pattern_of
 
 SIXTY_THREE = np.uint64(63)
 

@@ -96,9 +96,7 @@ def divide(
             place_face(triangles, face, scale, bricks, i, local)
             own[:] = False
             mark_texels(local, normals, face, own, sums[k] if row >= 0 else no_sums)
-            for t in range(512):
-                if own[t] and (not marked[k, t] or number[k, t] == usual):
-                    marked[k, t], number[k, t] = True, numbers[face]
+            _note_number(own, numbers[face], usual, marked[k], number[k])
         if only_masks:
             for k in range(n):
                 pack_bits(marked[k], masks[entry + k])
@@ -107,6 +105,14 @@ def divide(
                 marked, number, sums, row >= 0, entry, n, masks, texel_first, texel_normals,
                 texel_parts,
             )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _note_number(own, this, usual, marked, number):
+    """Mark a face's own texels, and note its number where there is none yet but the usual one."""
+    for t in range(512):
+        if own[t] and (not marked[t] or number[t] == usual):
+            marked[t], number[t] = True, this
 
 
 @njit(cache=True, nogil=True)

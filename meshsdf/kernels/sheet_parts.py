@@ -72,11 +72,19 @@ def find_parts(
         for a in range(n):
             labels[start + a] = part_of[a]
         n_parts[i] = n_found
-        for a in range(n_found):
-            second[i] |= np.uint32(sheet_of[a]) << np.uint32(a)
-            for b in range(n_found):
-                if a != b and sheet_of[a] == sheet_of[b] and _share(bits, sums, a, b):
-                    clash[i, a] |= np.uint32(1) << np.uint32(b)
+        second[i] |= _note_clashes(sheet_of, bits, sums, n_found, clash[i])
+
+
+@njit(cache=True, nogil=True)
+def _note_clashes(sheet_of, bits, sums, n_found, clash):
+    """Set the bits of ``clash`` for parts of one sheet; which parts are of the second, as bits."""
+    second = np.uint32(0)
+    for a in range(n_found):
+        second |= np.uint32(sheet_of[a]) << np.uint32(a)
+        for b in range(n_found):
+            if a != b and sheet_of[a] == sheet_of[b] and _share(bits, sums, a, b):
+                clash[a] |= np.uint32(1) << np.uint32(b)
+    return second
 
 
 @njit(cache=True, nogil=True)

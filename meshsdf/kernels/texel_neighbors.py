@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 
+from .bits import count_bits
 from .octree_tables import (
     ANY_PART,
     FIRST_BITS,
@@ -82,16 +83,5 @@ def texel_code(first, masks, e, t):
     """Which of all texels the texel t of an entry is."""
     at = first[e]
     for word in range(t >> 6):
-        at += _count(masks[e, word])
-    return at + _count(masks[e, t >> 6] & ((np.uint64(1) << np.uint64(t & 63)) - np.uint64(1)))
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _count(word):
-    """How many bits of a word are set (in parallel, by ever larger parts of it)."""
-    word -= (word >> np.uint64(1)) & np.uint64(0x5555555555555555)
-    word = (word & np.uint64(0x3333333333333333)) + (
-        (word >> np.uint64(2)) & np.uint64(0x3333333333333333)
-    )
-    word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
-    return np.int64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
+        at += count_bits(masks[e, word])
+    return at + count_bits(masks[e, t >> 6] & ((np.uint64(1) << np.uint64(t & 63)) - np.uint64(1)))

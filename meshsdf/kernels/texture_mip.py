@@ -5,7 +5,8 @@ from numba import njit
 
 from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, nearest_sheet, part_bit, sheets_of
 from .sheets import MAX_SHEETS, decode_normal
-from .texel_codes import decode, encode
+from .texel_codes import decoded, encode
+from .texel_neighbors import texel_code
 from .texture_lookup import ABSENT, FIRST_TILE, needed
 
 UNCHANGED, CHANGED = 0, 1
@@ -152,7 +153,7 @@ def _gather_entry(
                     continue
                 word = pool[slot, t] if slot >= 0 else tiles[FIRST_TILE - slot]
                 words[at] = word
-                r, g, b, a = decode(kind, word)
+                r, g, b, a = decoded(kind, np.int64(word))
                 around[at, 0], around[at, 1], around[at, 2], around[at, 3] = r, g, b, a
 
 
@@ -224,21 +225,7 @@ def _word(kind, sr, sg, sb, sa, sw):
 def _looks_along(tables, sheet, group, e, t):
     """Whether texel t of entry e is of the parts of ``sheet``, and looks its way more than that of
     others of its ``group``."""
-    at = tables.texel_first[e]
-    for word in range(t >> 6):
-        at += _bits(tables.masks[e, word])
-    at += _bits(tables.masks[e, t >> 6] & ((np.uint64(1) << np.uint64(t & 63)) - np.uint64(1)))
+    at = texel_code(tables.texel_first, tables.masks, e, t)
     nx, ny, nz = decode_normal(tables.texel_normals[at, 0], tables.texel_normals[at, 1])
     part = part_bit(tables.texel_parts, at)
     return nearest_sheet(tables.groups, tables.sheets, group, nx, ny, nz, part) == sheet
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _bits(word):
-    """How many bits of a word are set."""
-    word -= (word >> np.uint64(1)) & np.uint64(0x5555555555555555)
-    word = (word & np.uint64(0x3333333333333333)) + (
-        (word >> np.uint64(2)) & np.uint64(0x3333333333333333)
-    )
-    word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
-    return np.int64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
