@@ -63,6 +63,12 @@ DRAWN = """() => {
 }"""
 
 
+NEXT_FRAMES = """() => new Promise((done) => {
+  const next = requestAnimationFrame;
+  next(() => next(() => next(done)));
+})"""
+
+
 class Painted:
     """A page that shows a model."""
 
@@ -97,6 +103,10 @@ class Painted:
         while (now := self.ask("meshsdf.viewer.stats()")) != before or now["isMoving"]:
             before = now
             time.sleep(0.6)  # longer than the page waits until it draws everything once more
+
+    def draw_what_waits(self) -> None:
+        """Until the page has drawn whatever it had been asked to by now."""
+        self.ask(NEXT_FRAMES)
 
     @property
     def middle(self) -> tuple[float, float]:

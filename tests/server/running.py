@@ -42,6 +42,11 @@ class Running:
         return f"http://127.0.0.1:{self.gate.port}"
 
     @property
+    def address(self) -> str:
+        """What `meshsdf paint` prints."""
+        return f"{self.base}/#t={self.gate.token}"
+
+    @property
     def bearer(self) -> dict[str, str]:
         """What a script sends to be let in."""
         return {"authorization": f"Bearer {self.gate.token}"}

@@ -94,7 +94,7 @@ def test_the_facts_are_all_that_a_page_needs(server):
 
 
 def test_every_pattern_can_be_filled_with_as_it_is_offered(server):
-    address = f"{server.base}/#t={server.gate.token}"
+    address = server.address
     with Painter(address) as painter:
         painter.operation("add-layer", name="patterns")
         painter.wait()
@@ -148,7 +148,7 @@ def test_bricks_of_every_picture_are_to_be_had(tmp_path):
         facts = client.get("/api/project").json()
         assert facts["pictures"] == ["base", "normal", "height"]
         assert facts["displays"] == ["color", "normal", "displacement"]
-        with Painter(f"{server.base}/#t={server.gate.token}") as painter:
+        with Painter(server.address) as painter:
             painter.begin(0, Brush(0.3, channel="height", value=2.0))
             painter.dabs(pole, pole)
             painter.end()

@@ -31,7 +31,7 @@ def picture(color=(0, 200, 0), size=(32, 32)) -> bytes:
 
 
 def test_a_picture_that_was_sent_can_be_projected(server):
-    with server.page() as page, Painter(f"{server.base}/#t={server.gate.token}") as painter:
+    with server.page() as page, Painter(server.address) as painter:
         answer = page.post("/api/images", content=picture())
         assert answer.status_code == 201
         told = answer.json()
@@ -106,7 +106,7 @@ def test_exports_under_way_neither_stop_painting_nor_see_half_of_it(server):
             codes.append(answer.status_code)
 
     threads = [threading.Thread(target=export, args=(number,)) for number in range(8)]
-    with Painter(f"{server.base}/#t={server.gate.token}") as painter:
+    with Painter(server.address) as painter:
         for thread in threads:
             thread.start()
         for turn in range(5):

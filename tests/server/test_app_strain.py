@@ -71,7 +71,7 @@ def dab(*place: float) -> bytes:
 
 @pytest.mark.parametrize("place", [(np.nan, 0, 0), (0, np.inf, 0), (0, 0, 3e38)])
 def test_a_dab_from_nowhere_is_refused_with_a_reason_and_painting_goes_on(server, place):
-    with Painter(f"{server.base}/#t={server.gate.token}") as painter:
+    with Painter(server.address) as painter:
         before = painter.digest()
         told = told_of(server, begin(), dab(*place))
         assert told["what"]

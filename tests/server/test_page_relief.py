@@ -5,19 +5,13 @@ import pytest
 
 from meshsdf.mesh.primitives import icosphere
 from meshsdf.server.bundle import STATIC
-from tests.server.browsing import Painted, browser_of_this_machine, opened
+from tests.server.browsing import Painted, opened
 from tests.server.running import Running, painted_ball, running
 
 LOW, EVEN, HIGH = (np.array(one) for one in ((0.17, 0.37, 0.66), (0.62,) * 3, (0.97, 0.69, 0.32)))
 ROUNDING = 0.5  # of a pixel's byte
 BLEND = 3 / 512  # of the range: the card's weights have 8 bits along each axis
 PEN = {"radius": 0.1, "hardness": 0.2, "pressure_radius": False}
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with browser_of_this_machine() as found:
-        yield found
 
 
 @pytest.fixture
@@ -34,7 +28,7 @@ def painted(browser, ball):
 
 
 def shown(browser, server: Running):
-    return opened(browser, f"{server.base}/#t={server.gate.token}", width=320, height=300)
+    return opened(browser, server.address, width=320, height=300)
 
 
 def sculpt(painted: Painted, *places: tuple[float, float], **tool) -> None:

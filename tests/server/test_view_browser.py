@@ -1,25 +1,22 @@
 """The page's view in a real browser: what is drawn is what the program says, whatever happens."""
 
+import time
+
 import numpy as np
 import pytest
 
 from meshsdf.mesh.primitives import icosphere
 from meshsdf.server.bundle import STATIC
+from meshsdf.server.feed import Feed
 from meshsdf.texture.journal import Project
 from meshsdf.texture.operations import Operation
-from tests.server.browsing import Painted, browser_of_this_machine, opened
+from tests.server.browsing import SECONDS, Painted, opened
 from tests.server.running import Running, painted_ball, running
 
 CLAY = np.array([0.40, 0.45, 0.52])  # what the page shows where nothing is painted
 ROUNDING = 0.5  # of a pixel's byte
 BLEND = 3 / 512  # linear: the card's weights have 8 bits along each axis
 BLUE = [0.05, 0.1, 0.8]
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with browser_of_this_machine() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +30,7 @@ def ball(tmp_path_factory):
 
 @pytest.fixture
 def painted(browser, ball):
-    with opened(browser, f"{ball.base}/#t={ball.gate.token}") as found:
+    with opened(browser, ball.address) as found:
         found.set("tool", color=BLUE, radius=0.12, pressure_radius=False)
         yield found
 
@@ -99,13 +96,29 @@ def test_a_stroke_changes_what_it_should_and_nothing_else(painted, ball):
     np.testing.assert_array_equal(painted.look()[2], before)
 
 
-def test_what_is_drawn_in_parts_is_what_is_drawn_at_once(painted):
+def wait_for_bricks(server: Running) -> None:
+    """Until pages show all bricks as the server has them: what is acknowledged may be painted
+    later."""
+    studio, end = server.studio, time.monotonic() + SECONDS
+
+    def is_shown(feed: Feed) -> bool:
+        return feed._complete_at == studio.bricks.revision and not feed._under_way
+
+    while studio.live.n_waiting or not all(is_shown(one.feed) for one in studio._subscribers):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def test_what_is_drawn_in_parts_is_what_is_drawn_at_once(painted, ball):
     painted.set("tool", radius=0.06)
     painted.settle()
     before = painted.ask("meshsdf.viewer.stats()")
     painted.drag((-40, 0), (0, 25), (40, 0), steps=12, lifts=False)
     painted.page.mouse.move(2, 2)  # the ring goes
-    painted.until("meshsdf.store.get().unacked === 0 && !meshsdf.viewer.stats().isMoving")
+    painted.until("meshsdf.store.get().unacked === 0")
+    wait_for_bricks(ball)
+    painted.until("!meshsdf.viewer.stats().isMoving")
+    painted.draw_what_waits()
     parts = painted.drawn().astype(int)
     now = painted.ask("meshsdf.viewer.stats()")
     assert now["parts"] > before["parts"] + 1
@@ -128,7 +141,7 @@ def test_a_line_that_breaks_in_mid_stroke_loses_and_doubles_nothing(painted, bal
 
 
 def test_two_pages_see_what_the_other_paints(painted, browser, ball):
-    with opened(browser, f"{ball.base}/#t={ball.gate.token}") as other:
+    with opened(browser, ball.address) as other:
         other.set("tool", color=[0.1, 0.6, 0.1], radius=0.1)
         painted.drag((-40, -30), (40, -30), lifts=False)
         other.drag((30, -60), (-10, 60))
@@ -175,8 +188,8 @@ def test_what_finds_no_room_on_the_card_shows_coarser_until_one_comes_near(brows
         clouds = {"layer": 0, "texture_kind": "clouds", "scale": 0.4}
         project.apply(Operation("bake", clouds))
     with running(tmp_path, STATIC) as server:
-        address = f"{server.base}/#t={server.gate.token}"
-        with opened(browser, address, most_3d=9) as painted:
+        address = server.address
+        with opened(browser, address, most_3d=16) as painted:
             stats = painted.ask("meshsdf.viewer.stats()")
             assert stats["bricks"] > 1000 > stats["capacity"] == stats["resident"] == 784
             points, normals, drawn = painted.look()
@@ -188,7 +201,7 @@ def test_what_finds_no_room_on_the_card_shows_coarser_until_one_comes_near(brows
 
 
 def test_fingers_paint_turn_and_zoom(browser, ball):
-    address = f"{ball.base}/#t={ball.gate.token}"
+    address = ball.address
     with opened(browser, address, has_touch=True) as painted:
         painted.set("tool", color=BLUE, radius=0.1)
         done = len(painted.store()["state"]["history"]["done"])

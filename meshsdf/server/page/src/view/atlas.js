@@ -1,19 +1,21 @@
 /**
  * Bricks of 9^3 nodes of one picture side by side in one volume on the graphics card.
  *
- * The volume grows by layers of bricks. Colours are sRGB there, so that the card blends them in
+ * The volume grows by layers of bricks. Its sides are powers of two, so that places in it are exact
+ * and a brick looks the same in every slot. Colours are sRGB there, so that the card blends them in
  * linear light; heights are pairs of halves, which every WebGL 2 filters, too.
  */
 
 import { Box3, ClampToEdgeWrapping, Data3DTexture, HalfFloatType, LinearFilter, NoColorSpace, RGBAFormat, RGFormat, SRGBColorSpace, UnsignedByteType, Vector3 } from "three"; // prettier-ignore
 
 export const SIDE = 9;
-export const ACROSS = 28; // bricks in a row, and rows in a layer: 252 nodes, which every card allows
+const WIDTH = 256; // nodes, which every card allows
+export const ACROSS = Math.floor(WIDTH / SIDE); // bricks in a row, and rows in a layer
 const PER_LAYER = ACROSS * ACROSS;
-const BYTES_PER_LAYER = 4 * (SIDE * ACROSS) ** 2 * SIDE; // of every picture
+const BYTES_PER_NODE = 4; // of every picture
 const MOST_BYTES = 512 * 2 ** 20;
 const MOST_BYTES_SMALL = 128 * 2 ** 20; // on machines with little memory
-const FIRST_LAYERS = { base: 2, normal: 1, height: 1 };
+const FIRST_DEPTH = { base: 32, normal: 16, height: 16 }; // nodes
 const STAGED = ACROSS; // bricks that go up in one call at most
 
 /** @typedef {import("./formats.js").Format} Format */
@@ -30,9 +32,10 @@ export class Atlas {
     const most = /** @type {WebGL2RenderingContext} */ (gl).MAX_3D_TEXTURE_SIZE;
     const memory = /** @type {any} */ (navigator).deviceMemory ?? 8;
     const bytes = memory <= 4 ? MOST_BYTES_SMALL : MOST_BYTES;
-    this.mostLayers = Math.min(Math.floor(gl.getParameter(most) / SIDE), Math.floor(bytes / BYTES_PER_LAYER));
-    this.layers = Math.min(FIRST_LAYERS[format.name], this.mostLayers);
-    this.texture = volume(this.layers, format);
+    const depth = Math.min(gl.getParameter(most), bytes / (BYTES_PER_NODE * WIDTH ** 2));
+    this.mostDepth = 2 ** Math.floor(Math.log2(depth));
+    this.depth = Math.min(FIRST_DEPTH[format.name], this.mostDepth);
+    this.texture = volume(this.depth, format);
     renderer.initTexture(this.texture);
     /** @type {number[]} */
     this.free = [];
@@ -44,12 +47,12 @@ export class Atlas {
 
   /** How many bricks it can ever hold. */
   get capacity() {
-    return this.mostLayers * PER_LAYER;
+    return Math.floor(this.mostDepth / SIDE) * PER_LAYER;
   }
 
   /** How many bricks it holds before it grows. */
   get room() {
-    return this.layers * PER_LAYER;
+    return Math.floor(this.depth / SIDE) * PER_LAYER;
   }
 
   /**
@@ -100,15 +103,15 @@ export class Atlas {
    * @returns {boolean} whether there is more room
    */
   grow(refill) {
-    const layers = Math.min(2 * this.layers, this.mostLayers);
-    if (layers === this.layers) return false;
-    const larger = volume(layers, this.format);
+    const depth = Math.min(2 * this.depth, this.mostDepth);
+    if (depth === this.depth) return false;
+    const larger = volume(depth, this.format);
     const gl = this.renderer.getContext();
     while (gl.getError() !== gl.NO_ERROR); // what went wrong before is not of this
     this.renderer.initTexture(larger);
     if (gl.getError() !== gl.NO_ERROR) {
       larger.dispose();
-      this.mostLayers = this.layers; // the card's memory is full
+      this.mostDepth = this.depth; // the card's memory is full
       return false;
     }
     // Copies pass through what can be drawn into, which halves need not be
@@ -116,7 +119,7 @@ export class Atlas {
     if (isCopied) this.renderer.copyTextureToTexture(this.texture, larger);
     this.texture.dispose();
     this.texture = larger;
-    this.layers = layers;
+    this.depth = depth;
     if (!isCopied) refill();
     return true;
   }
@@ -141,11 +144,11 @@ export function slotPlace(slot) {
 }
 
 /**
- * @param {number} layers
+ * @param {number} depth
  * @param {Format} format
  */
-function volume(layers, { name, Kind }) {
-  const texture = new Data3DTexture(null, SIDE * ACROSS, SIDE * ACROSS, SIDE * layers);
+function volume(depth, { name, Kind }) {
+  const texture = new Data3DTexture(null, WIDTH, WIDTH, depth);
   const isHalves = Kind === Uint16Array;
   texture.format = isHalves ? RGFormat : RGBAFormat;
   texture.type = isHalves ? HalfFloatType : UnsignedByteType;

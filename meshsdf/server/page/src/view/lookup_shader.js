@@ -81,8 +81,10 @@ bool isUniform(uvec2 state) {
   return state.x != 0x80000000u;
 }
 
+// To the 8192nd part of a texel, which is exact wherever in the atlas the brick is
 vec4 inAtlas(highp sampler3D atlas, uvec2 state, vec3 local) {
   uvec3 slot = uvec3(state.y, state.y >> 10u, state.y >> 20u) & 1023u;
+  local = floor(local * 8192.0 + 0.5) / 8192.0;
   return textureLod(atlas, (vec3(slot) + local + 0.5) / vec3(textureSize(atlas, 0)), 0.0);
 }
 `;
