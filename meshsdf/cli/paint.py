@@ -2,7 +2,6 @@
 
 import os
 import webbrowser
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -59,40 +58,49 @@ def command(mesh: str, project: str | None, resolution, port, opens: bool, allow
     console.watch_compilation()
     check_extra()
     from ..server.bundle import COMMAND
+    from ..server.helper import Helper
     from ..server.paint import Place, paint
     from ..server.security import LOOPBACK
     from ..server.static_page import has_page
 
-    with _warming_up(console):
-        live, loaded = _opened(console, mesh, project, resolution)
-    if not has_page():
-        console.warn(f"the painting page is not here; this command adds it: {COMMAND}")
-    if allow_remote:
-        console.warn("others on the network can reach this server, and may read along what it says")
-    place = Place(allow_remote or LOOPBACK, port)
-    with _opener(console, opens) as ready:
-        paint(live, name=Path(mesh).stem, mesh=loaded, place=place, ready=ready)
+    with Helper() as helper:
+        with _warming_up(console, helper):
+            live, loaded = _opened(console, mesh, project, resolution)
+        if not has_page():
+            console.warn(f"the painting page is not here; this command adds it: {COMMAND}")
+        if allow_remote:
+            console.warn("others on the network can reach this server, and may read what it says")
+        place = Place(allow_remote or LOOPBACK, port)
+        with _opener(console, opens) as ready:
+            paint(live, name=Path(mesh).stem, mesh=loaded, place=place, ready=ready)
     n_steps = plural(live.project.last_seq, "step")
     console.say(f"{live.project.path}: closed, with {n_steps}")
     return YES
 
 
 @contextmanager
-def _warming_up(console: Console):
+def _warming_up(console: Console, helper):
     """Beside the body, load what strokes need, and leave when both are done.
 
-    On a new machine that is compiled here, not when the first stroke comes.
+    On a new machine that is compiled here (by two processes), not when the first stroke comes.
     """
     from ..errors import MeshsdfError
     from ..server.warm_up import warm_up
 
-    with ThreadPoolExecutor(1) as thread:
-        warmed = thread.submit(warm_up)
-        yield
+    troubles: list[str] = []
+
+    def work() -> None:
         try:
-            warmed.result()
+            warm_up(helper)
         except (MeshsdfError, OSError) as error:
-            console.warn(f"the first strokes may be slow: {error}")
+            troubles.append(f"the first strokes may be slow: {error}")
+
+    thread = Thread(target=work, daemon=True)  # of which Ctrl-C need not wait for the end
+    thread.start()
+    yield
+    thread.join()
+    for words in troubles:
+        console.warn(words)
 
 
 def check_extra() -> None:

@@ -13,9 +13,9 @@ from numba import njit
 
 from .blending import NORMAL, composite
 from .brush_reach import HALF_DIAGONAL, MARGIN, ROW, segment_distance2
-from .texel_codes import F0, F1, HALF1, VALUE8, decode, encode
+from .texel_codes import F0, F1, HALF1, VALUE8, decoded, encode
 from .texel_neighbors import is_beside, parts_beside
-from .texture_lookup import ABSENT, FIRST_TILE, read_texel
+from .texture_lookup import ABSENT, FIRST_TILE, stored_texel
 
 FALLOFFS = ("smooth", "linear", "round")
 SMOOTH, LINEAR, ROUND = range(3)
@@ -318,7 +318,7 @@ def lay(
     r, g, b, a = color[0], color[1], color[2], color[3]
     erases = action == ERASE
     if erases:
-        r, g, b, a = decode(kind, nothing)
+        r, g, b, a = decoded(kind, np.int64(nothing))
         mode = NORMAL
     fades = erases and kind != HALF1 and kind != VALUE8  # by alpha, where there is one
     for i in range(begin, end):
@@ -330,7 +330,7 @@ def lay(
             if fades and share >= F1:
                 pool[slot, t] = nothing
                 continue
-            below = read_texel(kind, base[row], pool, tiles, t)
+            below = stored_texel(kind, base[row], pool, tiles, t)
             if action == COPY:
                 r, g, b, a = (
                     source[row, t, 0],

@@ -11,7 +11,7 @@ from .octree_tables import SELF, part_bit
 from .sheets import decode_normal
 from .texel_codes import F0, F1, encode
 from .texel_neighbors import beside_texel
-from .texture_lookup import ABSENT, needed, read_texel, stored_value
+from .texture_lookup import ABSENT, needed, stored_texel, stored_value
 
 
 @njit(cache=True, nogil=True)
@@ -36,11 +36,11 @@ def blurred(
                 u = ((x & 7) << 6) + ((y & 7) << 3) + (z & 7)
                 if f < 0 or slots[f] == ABSENT or not needed(tables.masks, f, u):
                     continue
-                r, g, b, a = read_texel(kind, slots[f], pool, tiles, u)
+                r, g, b, a = stored_texel(kind, slots[f], pool, tiles, u)
                 weight = np.float32((2 - abs(dx)) * (2 - abs(dy)) * (2 - abs(dz)))
                 w = weight * a
                 sr, sg, sb, sa, sw = sr + w * r, sg + w * g, sb + w * b, sa + w, sw + weight
-            own = read_texel(kind, slots[e], pool, tiles, t)
+            own = stored_texel(kind, slots[e], pool, tiles, t)
             share = opacity * coverage[rows[i], t]
             if sa > F0:
                 mean = sr / sa, sg / sa, sb / sa, sa / sw
@@ -82,7 +82,7 @@ def smudged(
                 np.int64(level), x, y, z, np.float64(nx), np.float64(ny), np.float64(nz),
                 part_bit(tables.texel_parts, code),
             )  # fmt: skip
-            own = read_texel(kind, slots[e], pool, tiles, t)
+            own = stored_texel(kind, slots[e], pool, tiles, t)
             share = opacity * coverage[rows[i], t] if found else F0
             r, g, b, a = mixed(own, (r, g, b, a), share)
             out[i, t] = encode(kind, r, g, b, a)

@@ -17,13 +17,13 @@ from .octree_tables import (
     sheets_of,
 )
 from .sheets import decode_normal
-from .texel_codes import F0, F1, decode
+from .texel_codes import F0, F1, decoded
 from .texture_lookup import (
     ABSENT,
     FIRST_TILE,
     corner_entry,
     needed,
-    read_texel,
+    stored_texel,
     stored_value,
 )
 
@@ -42,7 +42,7 @@ def layer_values(tables, slots, own, pool, tiles, kind, entries, first, out):
     for i in range(len(entries)):
         e, slot = entries[i], own[i]
         if slot <= FIRST_TILE:
-            r, g, b, a = decode(kind, tiles[FIRST_TILE - slot])
+            r, g, b, a = decoded(kind, np.int64(tiles[FIRST_TILE - slot]))
             for at in range(first[i], first[i + 1]):
                 out[at, 0], out[at, 1], out[at, 2], out[at, 3] = r, g, b, a
             continue
@@ -53,7 +53,7 @@ def layer_values(tables, slots, own, pool, tiles, kind, entries, first, out):
             if not needed(masks, e, t):
                 continue
             if slot >= 0:
-                r, g, b, a = decode(kind, pool[slot, t])
+                r, g, b, a = decoded(kind, np.int64(pool[slot, t]))
             else:
                 nx, ny, nz = decode_normal(
                     tables.texel_normals[code, 0], tables.texel_normals[code, 1]
@@ -127,73 +127,94 @@ def _node_value(
     below = 1
     while level < len(heads):
         i, j, k = x >> below, y >> below, z >> below
-        size = 1 << below
         ox, oy, oz = x - (i << below), y - (j << below), z - (k << below)
-        base = find_code(heads, pages, level, i >> 3, j >> 3, k >> 3)
-        if base < NO_ENTRY:
-            base = nearest_sheet(groups, sheets, base, nx, ny, nz, part)
-        # Most cells lie within one brick that has all their corners
-        stored, absent = 0, 0
-        slot = slots[base] if base >= 0 else np.int32(ABSENT)
-        if slot != ABSENT:
-            stored = _corners_within(masks, base, i & 7, j & 7, k & 7, ox, oy, oz)
-        is_within = stored > 0
-        for c in range(0 if is_within else 8):
-            cx, cy, cz = c >> 2, (c >> 1) & 1, c & 1
-            if (cx and ox == 0) or (cy and oy == 0) or (cz and oz == 0):
-                continue
-            e = corner_of_cell(
-                heads, pages, groups, sheets, neighbors, level, base, i, j, k, cx, cy, cz, nx, ny,
-                nz, part,
+        base, is_within, stored, absent = _corners_around(
+            heads, pages, groups, sheets, neighbors, masks, slots, level, i, j, k, ox, oy, oz, nx,
+            ny, nz, part,
+        )  # fmt: skip
+        if stored:
+            scale = F1 / np.float32(1 << below)
+            return _blend_of_corners(
+                heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level,
+                base, is_within, stored, absent, i, j, k, np.float32(ox) * scale,
+                np.float32(oy) * scale, np.float32(oz) * scale, nx, ny, nz, part,
             )  # fmt: skip
-            if e >= 0 and needed(masks, e, texel_index(i + cx, j + cy, k + cz)):
-                if slots[e] == ABSENT:
-                    absent |= 1 << c
-                else:
-                    stored |= 1 << c
-        if stored == 0:
-            level += 1
-            below += 1
+        level += 1
+        below += 1
+    return F0, F0, F0, F0
+
+
+@njit(cache=True, nogil=True)
+def _corners_around(
+    heads, pages, groups, sheets, neighbors, masks, slots, level, i, j, k, ox, oy, oz, nx, ny, nz,
+    part,
+):  # fmt: skip
+    """base, is_within, stored, absent: the entry of cell (i, j, k), whether it has all corners
+    with weight, and which of these are stored and which only exist, as bits."""
+    base = find_code(heads, pages, level, i >> 3, j >> 3, k >> 3)
+    if base < NO_ENTRY:
+        base = nearest_sheet(groups, sheets, base, nx, ny, nz, part)
+    # Most cells lie within one brick that has all their corners
+    if base >= 0 and slots[base] != ABSENT:
+        stored = _corners_within(masks, base, i & 7, j & 7, k & 7, ox, oy, oz)
+        if stored:
+            return base, True, stored, 0
+    stored, absent = 0, 0
+    for c in range(8):
+        cx, cy, cz = c >> 2, (c >> 1) & 1, c & 1
+        if (cx and ox == 0) or (cy and oy == 0) or (cz and oz == 0):
             continue
-        scale = F1 / np.float32(size)
-        fx, fy, fz = np.float32(ox) * scale, np.float32(oy) * scale, np.float32(oz) * scale
-        sr, sg, sb, sa, sw = F0, F0, F0, F0, F0
-        r0, g0, b0, a0 = F0, F0, F0, F0
-        first, same = True, True
-        for c in range(8):
-            if not ((stored | absent) >> c) & 1:
-                continue
-            cx, cy, cz = c >> 2, (c >> 1) & 1, c & 1
-            if is_within:
-                r, g, b, a = read_texel(
-                    kind, slot, pool, tiles, texel_index(i + cx, j + cy, k + cz)
-                )
-            elif (stored >> c) & 1:
+        e = corner_of_cell(
+            heads, pages, groups, sheets, neighbors, level, base, i, j, k, cx, cy, cz, nx, ny, nz,
+            part,
+        )  # fmt: skip
+        if e >= 0 and needed(masks, e, texel_index(i + cx, j + cy, k + cz)):
+            if slots[e] == ABSENT:
+                absent |= 1 << c
+            else:
+                stored |= 1 << c
+    return base, False, stored, absent
+
+
+@njit(cache=True, nogil=True)
+def _blend_of_corners(
+    heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level, base,
+    is_within, stored, absent, i, j, k, fx, fy, fz, nx, ny, nz, part,
+):  # fmt: skip
+    """r, g, b, a: the blend of a cell's corners, see `_corners_around`, at (fx, fy, fz) in it."""
+    sr, sg, sb, sa, sw = F0, F0, F0, F0, F0
+    r0, g0, b0, a0 = F0, F0, F0, F0
+    first, same = True, True
+    for c in range(8):
+        if not ((stored | absent) >> c) & 1:
+            continue
+        cx, cy, cz = c >> 2, (c >> 1) & 1, c & 1
+        if (stored >> c) & 1:
+            e = base
+            if not is_within:
                 e = corner_of_cell(
                     heads, pages, groups, sheets, neighbors, level, base, i, j, k, cx, cy, cz, nx,
                     ny, nz, part,
                 )  # fmt: skip
-                t = texel_index(i + cx, j + cy, k + cz)
-                r, g, b, a = read_texel(kind, slots[e], pool, tiles, t)
-            else:
-                r, g, b, a, found = stored_value(
-                    heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind,
-                    level + 1, 0.5 * (i + cx), 0.5 * (j + cy), 0.5 * (k + cz), nx, ny, nz,
-                    part,
-                )  # fmt: skip
-                if not found:
-                    continue
-            if first:
-                r0, g0, b0, a0, first = r, g, b, a, False
-            same &= r == r0 and g == g0 and b == b0 and a == a0
-            w = (fx if cx else F1 - fx) * (fy if cy else F1 - fy) * (fz if cz else F1 - fz)
-            wa = w * a
-            sr, sg, sb, sa, sw = sr + wa * r, sg + wa * g, sb + wa * b, sa + wa, sw + w
-        if same:
-            return r0, g0, b0, a0
-        if sa > F0:
-            return sr / sa, sg / sa, sb / sa, sa / sw
-        return F0, F0, F0, F0
+            t = texel_index(i + cx, j + cy, k + cz)
+            r, g, b, a = stored_texel(kind, slots[e], pool, tiles, t)
+        else:
+            r, g, b, a, found = stored_value(
+                heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind,
+                level + 1, 0.5 * (i + cx), 0.5 * (j + cy), 0.5 * (k + cz), nx, ny, nz, part,
+            )  # fmt: skip
+            if not found:
+                continue
+        if first:
+            r0, g0, b0, a0, first = r, g, b, a, False
+        same &= r == r0 and g == g0 and b == b0 and a == a0
+        w = (fx if cx else F1 - fx) * (fy if cy else F1 - fy) * (fz if cz else F1 - fz)
+        wa = w * a
+        sr, sg, sb, sa, sw = sr + wa * r, sg + wa * g, sb + wa * b, sa + wa, sw + w
+    if same:
+        return r0, g0, b0, a0
+    if sa > F0:
+        return sr / sa, sg / sa, sb / sa, sa / sw
     return F0, F0, F0, F0
 
 
@@ -214,7 +235,7 @@ def _corners_within(masks, e, x, y, z, ox, oy, oz):
     return bits
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def corner_of_cell(
     heads, pages, groups, sheets, neighbors, level, base, i, j, k, cx, cy, cz, nx, ny, nz, part
 ):

@@ -6,7 +6,7 @@ from numba import njit
 from .node_values import MIXED, corner_of_cell, texel_index, tile_above
 from .octree_tables import FIRST_GROUP, NO_ENTRY, find_code, find_entry, part_bit, sheets_of
 from .sheets import decode_normal
-from .texel_codes import decode
+from .texel_codes import decoded
 from .texture_lookup import ABSENT, FIRST_TILE, needed
 
 FAR = np.int64(1) << 60
@@ -58,7 +58,7 @@ def unlike_above(tables, slots, pool, tiles, kind, entries, first, seen, shown, 
             if not needed(tables.masks, e, t):
                 continue
             own = tiles[FIRST_TILE - slot] if slot <= FIRST_TILE else pool[slot, t]
-            r, g, b, a = decode(kind, own)
+            r, g, b, a = decoded(kind, np.int64(own))
             same = r == seen[at, 0] and g == seen[at, 1] and b == seen[at, 2] and a == seen[at, 3]
             shown[i] |= not same
             if not same:

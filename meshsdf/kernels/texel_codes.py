@@ -92,6 +92,13 @@ def decode(kind, texel):
 
 
 @njit(cache=True, nogil=True)
+def decoded(kind, word):
+    """As `decode`, for where a call costs little beside what else is done: it is compiled once,
+    not in every place that asks."""
+    return decode(kind, word)
+
+
+@njit(cache=True, nogil=True)
 def srgb_code(value):
     """The 8-bit sRGB code nearest to a linear value; NaN gives 0."""
     if not value >= STEPS[0]:

@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit
 
 from .octree_tables import SELF, find_code, nearest_sheet
-from .texel_codes import decode
-from .texture_lookup import ABSENT, FIRST_TILE, blend, level_value
+from .texel_codes import decoded
+from .texture_lookup import ABSENT, FIRST_TILE, blend, blended, level_value
 
 BLOCK = 256
 COLUMNS = 9
@@ -126,7 +126,9 @@ def _find_steps(neighbors, masks, slots, tiles, kind, n_plain, n_other, numbers,
             numbers[kept, PLAIN] = q
             kept += 1
         elif slot <= FIRST_TILE and slot == other and beside >= 0 and (exist or not there):
-            out[q, 0], out[q, 1], out[q, 2], out[q, 3] = decode(kind, tiles[FIRST_TILE - slot])
+            out[q, 0], out[q, 1], out[q, 2], out[q, 3] = decoded(
+                kind, np.int64(tiles[FIRST_TILE - slot])
+            )
         else:
             numbers[n_other, OTHER] = q
             n_other += 1
@@ -190,7 +192,7 @@ def _blend_across(neighbors, masks, slots, pool, kind, n_across, n_other, number
             n_other += 1
             continue
         x, ux = x << 6, ux << 6
-        out[q, 0], out[q, 1], out[q, 2], out[q, 3] = blend(
+        out[q, 0], out[q, 1], out[q, 2], out[q, 3] = blended(
             kind, pool[s0, x | y | z], pool[s1, x | y | uz], pool[s2, x | uy | z],
             pool[s3, x | uy | uz], pool[s4, ux | y | z], pool[s5, ux | y | uz],
             pool[s6, ux | uy | z], pool[s7, ux | uy | uz], between[q, 0], between[q, 1],

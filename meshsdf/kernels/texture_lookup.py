@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from .octree_tables import FIRST_GROUP, SELF, find_code, find_entry, nearest_sheet
-from .texel_codes import F0, F1, LINEAR, SRGB8, decode
+from .texel_codes import F0, F1, LINEAR, SRGB8, decode, decoded
 
 ABSENT = -1  # slot of an entry that is not stored; below that, -2 - tile
 FIRST_TILE = -2
@@ -28,6 +28,12 @@ def read_texel(kind, slot, pool, tiles, t):
     if slot >= 0:
         return decode(kind, pool[slot, t])
     return decode(kind, tiles[FIRST_TILE - slot])
+
+
+@njit(cache=True, nogil=True)
+def stored_texel(kind, slot, pool, tiles, t):
+    """As `read_texel`, by a call, see `decoded`."""
+    return decoded(kind, np.int64(pool[slot, t] if slot >= 0 else tiles[FIRST_TILE - slot]))
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -88,7 +94,7 @@ def stored_value(
             slot = slots[e]
             if slot == ABSENT or not needed(masks, e, t):
                 continue
-            r, g, b, a = read_texel(kind, slot, pool, tiles, t)
+            r, g, b, a = stored_texel(kind, slot, pool, tiles, t)
             if first:
                 r0, g0, b0, a0, first = r, g, b, a, False
             elif r != r0 or g != g0 or b != b0 or a != a0:
@@ -131,13 +137,13 @@ def level_value(
             if base >= 0:
                 slot = slots[base]
             if slot <= FIRST_TILE:
-                return decode(kind, tiles[FIRST_TILE - slot])
+                return decoded(kind, np.int64(tiles[FIRST_TILE - slot]))
             if slot >= 0:
                 shift = np.uint64((ty << 3) + tz)
                 both = masks[base, tx] & masks[base, tx + 1]
                 if (both >> shift) & CORNER_PATTERN == CORNER_PATTERN:
                     t = (tx << 6) + (ty << 3) + tz
-                    return blend(
+                    return blended(
                         kind, pool[slot, t], pool[slot, t + 1], pool[slot, t + 8],
                         pool[slot, t + 9], pool[slot, t + 64], pool[slot, t + 65],
                         pool[slot, t + 72], pool[slot, t + 73],
@@ -158,7 +164,7 @@ def level_value(
             s6 = _stored_corner(neighbors, masks, slots, base, ux, uy, tz)
             s7 = _stored_corner(neighbors, masks, slots, base, ux, uy, uz)
             if min(min(min(s0, s1), min(s2, s3)), min(min(s4, s5), min(s6, s7))) >= 0:
-                return blend(
+                return blended(
                     kind,
                     pool[s0, _texel_index(tx, ty, tz)], pool[s1, _texel_index(tx, ty, uz)],
                     pool[s2, _texel_index(tx, uy, tz)], pool[s3, _texel_index(tx, uy, uz)],
@@ -210,7 +216,13 @@ def blend(kind, t000, t001, t010, t011, t100, t101, t110, t111, fx, fy, fz):
     return F0, F0, F0, F0
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
+def blended(kind, t000, t001, t010, t011, t100, t101, t110, t111, fx, fy, fz):
+    """As `blend`, by a call, see `decoded`."""
+    return blend(kind, t000, t001, t010, t011, t100, t101, t110, t111, fx, fy, fz)
+
+
+@njit(cache=True, nogil=True, forceinline=True)
 def _added_opaque(sums, weight, texel):
     word = np.int64(texel)
     return (
@@ -221,7 +233,7 @@ def _added_opaque(sums, weight, texel):
     )
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, forceinline=True)
 def _added(kind, sums, weight, texel):
     r, g, b, a = decode(kind, texel)
     w = weight * a
@@ -283,7 +295,7 @@ def _blend_across(
                 heads, pages, groups, sheets, neighbors, level, base, bx, by, bz, ox >> 3, oy >>
                 3, oz >> 3, nx, ny, nz, part,
             )  # fmt: skip
-            r, g, b, a = read_texel(kind, slots[e], pool, tiles, _texel_index(ox, oy, oz))
+            r, g, b, a = stored_texel(kind, slots[e], pool, tiles, _texel_index(ox, oy, oz))
         else:
             r, g, b, a, found = stored_value(
                 heads, pages, groups, sheets, neighbors, masks, slots, pool, tiles, kind, level +

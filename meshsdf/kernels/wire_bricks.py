@@ -10,7 +10,7 @@ from numba import njit
 
 from .texel_codes import F0, F1, SRGB8
 from .texel_neighbors import entry_parts, texel_part
-from .texture_lookup import read_texel, stored_value
+from .texture_lookup import stored_texel, stored_value
 from .wire_codes import node_code, node_numbers
 from .wire_nodes import (
     COARSER,
@@ -88,7 +88,7 @@ def _fill_grid(tables, slots, pool, tiles, kind, picture, e, origin, holders, gr
             if kind == SRGB8 and slot >= 0 and pool[slot, t] >= OPAQUE:
                 grid[at] = pool[slot, t]
                 continue
-            r, g, b, a = read_texel(kind, slot, pool, tiles, t)
+            r, g, b, a = stored_texel(kind, slot, pool, tiles, t)
         else:
             nx, ny, nz, parts = sheets[e, 0], sheets[e, 1], sheets[e, 2], own
             if said == COARSER:

@@ -69,7 +69,7 @@ class Requests:
             live.begin(client, cseq, body.layer, brush)
         elif isinstance(body, Samples):
             points = body.points + self.studio.origin
-            live.keep(client, cseq, points, body.normals, body.pressures)
+            live.keep(client, cseq, np.column_stack([points, body.normals, body.pressures]))
         elif isinstance(body, OperationAsked):
             return self._apply(client, cseq, self._operation(body), replaces=body.replaces)
         elif message.type is Type.STROKE_END:

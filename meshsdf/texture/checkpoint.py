@@ -22,13 +22,6 @@ from .volume_texture import VolumeTexture
 PIECES = 16
 
 CHUNKS = """
-INSERT INTO brick
-SELECT DISTINCT layer, channel, chunk, :seq, 0, :crc, x'0000' FROM brick AS old
-WHERE layer = :layer AND NOT EXISTS (
-    SELECT 1 FROM brick WHERE layer = old.layer AND channel = old.channel
-    AND chunk = old.chunk AND seq = :seq)
-"""
-CHUNKS = """
 SELECT layer, channel, chunk, MAX(seq), codec, crc32, data FROM brick
 WHERE seq <= ? GROUP BY layer, channel, chunk
 """

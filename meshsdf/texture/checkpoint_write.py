@@ -7,7 +7,7 @@ project. Rows that no kept checkpoint needs are removed, too.
 """
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from .blobs import pack, pack_all
 from .content import Frozen
@@ -37,7 +37,13 @@ WHERE layer = :layer AND NOT EXISTS (
 
 
 def write_checkpoint(
-    connection: Writer, frozen: Frozen, seq: int, tip: int, origin: int, *, alone: bool = False
+    connection: Writer,
+    frozen: Frozen,
+    seq: int,
+    tip: int,
+    origin: int,
+    *,
+    rest: Callable[[], None] | None = None,
 ) -> None:
     """Keep what a texture held after operation ``seq``; on any thread.
 
@@ -49,13 +55,15 @@ def write_checkpoint(
         What it held.
     seq, tip, origin : int
         ``tip`` is the latest step that was done; the checkpoint of ``origin`` is never removed.
-    alone : bool
-        Whether one core has to do, as others are painting.
+    rest : callable, optional
+        Called between transactions, if others are painting; one core has to do then, too.
     """
     in_one(connection, (BROKEN_OFF, ()))
-    for rows in _slices(frozen, seq, alone):
+    for rows in _slices(frozen, seq, rest is not None):
         with transaction(connection):
             connection.executemany(INSERT, rows)
+        if rest is not None:
+            rest()
     codes = frozen.codes()
     layers = [(seq, number, *pack(data)) for number, data in codes.items()]
     digest = frozen.digest(codes)
@@ -73,7 +81,7 @@ def write_checkpoint(
             "(SELECT seq FROM checkpoint ORDER BY seq DESC LIMIT ?)",
             (origin, KEPT),
         )
-    _prune(connection)
+    _prune(connection, rest)
 
 
 def _slices(frozen: Frozen, seq: int, alone: bool) -> Iterator[list[tuple]]:
@@ -89,10 +97,12 @@ def _slices(frozen: Frozen, seq: int, alone: bool) -> Iterator[list[tuple]]:
         yield rows
 
 
-def _prune(connection: Writer) -> None:
+def _prune(connection: Writer, rest: Callable[[], None] | None) -> None:
     """Remove the rows that no checkpoint needs."""
     ids = connection.execute(UNNEEDED).fetchall()
     for begin in range(0, len(ids), ROWS_AT_ONCE):
         with transaction(connection):
             some = ids[begin : begin + ROWS_AT_ONCE]
             connection.executemany("DELETE FROM brick WHERE rowid = ?", some)
+        if rest is not None:
+            rest()

@@ -95,7 +95,8 @@ class Checkpoints:
             if is_due and self._under_way is None:
                 frozen = self._content.freeze(slots_of)
                 work = write_checkpoint, frozen, seq, self._tip, self._origin
-                self._under_way = _UnderWay(frozen, seq, self._housekeeping.do(*work, alone=True))
+                written = self._housekeeping.do(*work, rest=self._housekeeping.rest)
+                self._under_way = _UnderWay(frozen, seq, written)
                 self.n_bytes = 0
         elif is_due:
             try:
@@ -115,7 +116,8 @@ class Checkpoints:
         if under_way is None:
             return
         try:
-            under_way.written.result()
+            with self._housekeeping.hurry():
+                under_way.written.result()
             self._take(under_way.frozen, under_way.seq)
         except (sqlite3.Error, OSError, MemoryError) as error:
             self._say(error)

@@ -12,7 +12,7 @@ from .blobs import Damaged
 from .journal_schema import FAULTS, Statement, Writer, in_one
 from .operations import TURNS, Operation
 
-KERNEL_VERSION = 3
+KERNEL_VERSION = 4
 """Raised whenever an operation leaves other texels than it did before."""
 
 COLUMNS = "seq, client, cseq, kind, layer, params, changed, kernel_version, t, crc32"

@@ -90,6 +90,7 @@ def connect(path: Path, turn: Turn | None = None) -> Writer:
     connection.execute("PRAGMA journal_mode = WAL")
     connection.execute("PRAGMA synchronous = FULL")
     connection.execute("PRAGMA foreign_keys = ON")
+    connection.execute("PRAGMA secure_delete = FAST")  # else rows that go are written as zeros
     connection.execute(f"PRAGMA journal_size_limit = {LONGEST_LOG}")
     connection.copy_log_on_commit(True)
     return connection

@@ -21,7 +21,7 @@ from .live_conflicts import layers_going, layers_touched
 from .live_stroke import LiveStroke
 from .operation_kinds import layer_numbered
 from .operations import Operation
-from .pending import PendingStroke, add_row, begin_row, mark_row
+from .pending import PendingStroke, Samples, add_row, begin_row, mark_row
 from .pool import Slots
 from .stroke_path import Normals
 
@@ -144,24 +144,17 @@ class LiveStrokes:
             No stroke of the client is open, the samples make no sense, or they cannot be kept;
             then nothing has changed.
         """
-        self.keep(client, cseq, points, normals, pressures)
+        pressures = np.ones(len(points)) if pressures is None else pressures
+        self.keep(client, cseq, np.column_stack([points, normals, pressures]))
         self.paint()
 
-    def keep(
-        self,
-        client: str,
-        cseq: int,
-        points: Points,
-        normals: Normals,
-        pressures: Values | None = None,
-    ) -> None:
-        """As `add`, but not painted on return: `paint` does that, or what comes after."""
+    def keep(self, client: str, cseq: int, samples: Samples) -> None:
+        """As `add`, of rows (n, 7): point, normal, pressure; not painted on return, but by `paint`
+        or what comes after."""
         with self._turn:
             if self._is_known(client, cseq):
                 return
             stroke = self._stroke_of(client)
-            pressures = np.ones(len(points)) if pressures is None else pressures
-            samples = np.column_stack([points, normals, pressures])
             row = add_row(client, cseq, samples)
             stroke.add(cseq, samples, lambda: self.project.pending.append(row))
             self._last[client] = cseq

@@ -11,6 +11,7 @@ from jaxtyping import Int32
 
 from ..arrays import Number
 from ..errors import TextureError
+from ..kernels.node_values import layer_values
 from ..kernels.octree_tables import NO_ENTRY
 from ..kernels.parallel import even_ranges, run_pieces
 from ..kernels.texel_places import texel_bits, texel_places
@@ -186,33 +187,52 @@ def family_of(texture: VolumeTexture, entries: Entries) -> Family:
     return family
 
 
-def seen_above(
-    texture: VolumeTexture, layer: Layer, entries: Entries, name: str, level: int | None = None
+def seen_above(texture: VolumeTexture, layer: Layer, entries: Entries, name: str) -> Numbers:
+    """What a channel shows at the texels of entries of one level by those above it."""
+    tables, pool = texture.octree.tables, texture.pool.arrays[name]
+    tiles, kind = texture.tiles.arrays[name], texture.channels[name].kind
+    first, ranges, seen = _texel_rows(texture, entries)
+
+    def work(piece: int) -> None:
+        begin, end = ranges[piece]
+        unstored = np.full(end - begin, ABSENT, np.int32)
+        layer_values(
+            tables, layer.slots, unstored, pool, tiles, kind, entries[begin:end],
+            first[begin : end + 1] - first[begin], seen[first[begin] : first[end]],
+        )  # fmt: skip
+
+    run_pieces(work, len(ranges))
+    return seen
+
+
+def seen_from(
+    texture: VolumeTexture, layer: Layer, entries: Entries, name: str, level: int
 ) -> Numbers:
-    """What a channel shows at the texels of entries of one level by ``level`` and those above it,
-    or by those above their own."""
+    """What a channel shows at the texels of entries of one level by ``level`` and those above."""
     tables = texture.octree.tables._replace(texel=1.0)  # places are then free of rounding
-    n_texels = tables.texel_first[entries + 1] - tables.texel_first[entries]
-    first = np.concatenate([[0], np.cumsum(n_texels)])
-    points, normals = np.empty((first[-1], 3)), np.empty((first[-1], 3))
-    parts = np.empty(first[-1], np.int64)
-    texel_bits(tables, entries, first, parts)
-    seen = np.empty((first[-1], 4), np.float32)
-    ranges = even_ranges(len(entries), -(-len(entries) // (ENTRIES_PER_PIECE // 8)))
-    width = np.array([2.0 ** (int(tables.levels[entries[0]]) + 1 if level is None else level)])
     pool, tiles = texture.pool.arrays[name], texture.tiles.arrays[name]
-    kind = texture.channels[name].kind
+    first, ranges, seen = _texel_rows(texture, entries)
+    points, normals = np.empty((len(seen), 3)), np.empty((len(seen), 3))
+    parts = np.empty(len(seen), np.int64)
+    texel_bits(tables, entries, first, parts)
 
     def work(piece: int) -> None:
         begin, end = ranges[piece]
         texel_places(tables, entries, first, begin, end, points, normals)
         sample(
-            tables, layer.slots, pool, tiles, kind, points, normals, parts, width, first[begin],
-            first[end], seen,
+            tables, layer.slots, pool, tiles, texture.channels[name].kind, points, normals, parts,
+            np.array([2.0**level]), first[begin], first[end], seen,
         )  # fmt: skip
 
     run_pieces(work, len(ranges))
     return seen
+
+
+def _texel_rows(texture: VolumeTexture, entries: Entries):
+    """The first row of every entry's texels, ranges of entries for threads, and (rows, 4)."""
+    first = np.concatenate([[0], np.cumsum(np.diff(texture.octree.tables.texel_first)[entries])])
+    ranges = even_ranges(len(entries), -(-len(entries) // (ENTRIES_PER_PIECE // 8)))
+    return first, ranges, np.empty((first[-1], 4), np.float32)
 
 
 def with_balance(texture: VolumeTexture, layer: Layer, entries: Entries) -> Entries:
@@ -269,7 +289,7 @@ def unlike_above(
     name: str,
     level: int | None = None,
 ) -> np.ndarray:
-    """By how much, at most, texels in slots differ from what `seen_above` says.
+    """By how much, at most, texels in slots differ from what `seen_above` or `seen_from` says.
 
     One number for each of the entries, which are of one level, in one channel: colours in sRGB
     times alpha, from 0 to 1; other channels in their own units.
@@ -281,7 +301,10 @@ def unlike_above(
         exists = texel_mask(texture, part)
         tiles = texture.tiles.arrays[name][np.maximum(FIRST_TILE - own, 0)]
         texels = np.where((own >= 0)[:, None], pool[own], tiles[:, None])[exists]
-        seen = seen_above(texture, layer, part, name, level)
+        if level is None:
+            seen = seen_above(texture, layer, part, name)
+        else:
+            seen = seen_from(texture, layer, part, name, level)
         difference = _difference(name, channel.decoded(texels), seen)
         first = np.concatenate([[0], np.cumsum(exists.sum(axis=1))])[:-1]
         apart[begin : begin + ENTRIES_AT_ONCE] = np.maximum.reduceat(difference, first)

@@ -6,10 +6,9 @@ python -m tests.benchmarks.painting storm MESH [--seconds 300]
 python -m tests.benchmarks.painting two MESH [--seconds 20]
 python -m tests.benchmarks.painting slow MESH [--seconds 60]
 
-latency  from sending a dab (60 per second, radius 25 texels) to its acknowledgement, which comes
-         after the commit; also strokes' ends.
-soak     the same for ten minutes; how much the server's memory grows, and the last minute beside
-         the first, and all between.
+latency  from a dab (60 per second, radius 25 texels) to its acknowledgement, after the commit.
+soak     the same for ten minutes: growth of the server's memory, the first minute, the last, and
+         all between. Beside it what the disk takes for a page in another file: no commit is faster.
 storm    a painter whose connection is cut every 200 ms, beside the same strokes without cuts.
 two      two painters at once: what each was sent, and the server's own, by their SHA-256.
 slow     a page that reads a megabit per second while another paints: the server's memory.
@@ -41,6 +40,7 @@ from meshsdf.spatial import ClosestPoint
 from meshsdf.texture.brush import Brush
 
 from .alternate import machine
+from .disk import Disk
 
 RATE = 60.0  # dabs per second
 RADIUS = 25  # texels
@@ -202,6 +202,11 @@ class Timed:
         return 1e3 * (self.told - self.sent)[rows]
 
 
+def highs(parts):
+    """The 99th percentile of every part."""
+    return " ".join(f"{np.percentile(one, 99):.1f}" for one in parts if len(one))
+
+
 def in_words(waits):
     """Median, 99 % and longest."""
     middle, high = np.percentile(waits, [50, 99])
@@ -228,7 +233,7 @@ def soak(mesh_path, mesh, seconds):
             warm, timed = Timed(painter, mesh, 10, seed=1), Timed(painter, mesh, seconds)
         warm.paint()
         sizes, begin = [], time.perf_counter()
-        with ThreadPoolExecutor(1) as pool:
+        with ThreadPoolExecutor(1) as pool, Disk() as disk:
             painting = pool.submit(timed.paint)
             while not painting.done():
                 sizes.append((time.perf_counter() - begin, server.resident))
@@ -239,9 +244,10 @@ def soak(mesh_path, mesh, seconds):
         part = min(60.0, seconds / 4)
         print(f"dabs in the first {part:.0f} s: {in_words(timed.waits('dab', 0, part))}")
         print(f"dabs in the last: {in_words(timed.waits('dab', seconds - part))}")
-        parts = [timed.waits("dab", at, at + part) for at in np.arange(0, seconds, part)]
-        highs = " ".join(f"{np.percentile(one, 99):.1f}" for one in parts if len(one))
-        print(f"99 %, every {part:.0f} s: {highs} ms")
+        begins = np.arange(0, seconds, part)
+        parts = [timed.waits("dab", at, at + part) for at in begins]
+        print(f"99 %, every {part:.0f} s: {highs(parts)} ms")
+        print(f"of the disk alone: {highs(disk.parts(begins[1:]))} ms")
         middle = next(size for at, size in sizes if at >= seconds / 4)
         print(f"memory from a quarter on: {100 * (sizes[-1][1] / middle - 1):+.1f} %")
 

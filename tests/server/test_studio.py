@@ -15,6 +15,7 @@ from meshsdf.texture import Brush, Operation, Project, housekeeping
 from meshsdf.texture.live import LiveStrokes
 
 UP = np.array([[0.0, 0.0, 1.0]])
+SAMPLE = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0]])  # point, normal, pressure
 
 
 class Page:
@@ -71,13 +72,13 @@ def test_samples_are_taken_in_while_the_studio_is_busy_and_are_painted_by_whatev
         before = await studio.do(studio.project.digest)
         busy = await studio.ask(gate.wait)
         for number in range(20):
-            await (await studio.ask_intake(live.keep, "a", 2 + number, UP, UP))
+            await (await studio.ask_intake(live.keep, "a", 2 + number, SAMPLE))
         found = live.last_cseq("a"), live.n_waiting >= 19, busy.done()
         gate.set()
         assert found == (21, True, False)
         assert await studio.do(studio.project.digest) != before
         assert live.n_waiting == 0
-        refused = await studio.ask_intake(live.keep, "b", 1, UP, UP)
+        refused = await studio.ask_intake(live.keep, "b", 1, SAMPLE)
         with pytest.raises(TextureError, match="no stroke open"):
             await refused
         await studio.close()
@@ -92,7 +93,7 @@ def test_the_log_does_not_grow_with_a_stroke_that_goes_on(tmp_path, monkeypatch)
         studio = studio_of(tmp_path)
         await studio.do(studio.live.begin, "a", 1, 0, Brush(0.2))
         for number in range(300):
-            await (await studio.ask_intake(studio.live.keep, "a", 2 + number, UP, UP))
+            await (await studio.ask_intake(studio.live.keep, "a", 2 + number, SAMPLE))
         size = (tmp_path / "a.mtex-wal").stat().st_size
         await studio.close()
         return size
@@ -112,7 +113,7 @@ def test_samples_wait_when_too_many_are_not_painted_yet(tmp_path, monkeypatch):
 
         async def send():
             for number in range(30):
-                await (await studio.ask_intake(live.keep, "a", 2 + number, UP, UP))
+                await (await studio.ask_intake(live.keep, "a", 2 + number, SAMPLE))
 
         sending = asyncio.create_task(send())
         await asyncio.wait([sending], timeout=0.5)

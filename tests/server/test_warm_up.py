@@ -8,7 +8,7 @@ CODE = """
 import gc, json, sys
 from numba.core.dispatcher import Dispatcher
 from meshsdf.mesh.primitives import icosphere
-from meshsdf.server.warm_up import BRUSHES, warm_up
+from meshsdf.server.warm_up import PLAIN, RARER, warm_up
 from meshsdf.texture.journal import Project
 from meshsdf.texture.live import LiveStrokes
 from meshsdf.texture.operations import Operation
@@ -27,9 +27,11 @@ def ready():
 
 warm_up()
 live, bricks = begin(sys.argv[1])
-points = icosphere(subdivisions=1).vertices[:5]
+places = icosphere(subdivisions=2).vertices
 before = ready()
-for turn, brush in enumerate(BRUSHES):
+for turn, brush in enumerate(2 * (PLAIN + RARER)):
+    # Beside what was painted, across its rim, and on it
+    points = places[7 * turn : 7 * turn + 12]
     live.begin("a", 10 * turn + 1, 1, brush)
     live.add("a", 10 * turn + 2, points, points)
     bricks.update()

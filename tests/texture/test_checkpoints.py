@@ -118,7 +118,7 @@ def test_samples_are_kept_on_one_thread_while_another_paints_and_keeps_house(
 
     def send():
         for cseq, samples in enumerate(sent, 2):
-            live.keep(ANNE, cseq, *samples)
+            live.keep(ANNE, cseq, np.column_stack(samples))
 
     thread = threading.Thread(target=send)
     thread.start()

@@ -1,0 +1,46 @@
+"""What the disk alone takes for a page, so that one can tell its own waits from a program's."""
+
+import os
+import tempfile
+import threading
+import time
+
+import numpy as np
+
+PAGE = 4096
+PAUSE = 0.1  # seconds
+
+
+class Disk:
+    """How long the disk takes for a page, while something else goes on."""
+
+    def __init__(self):
+        self.waits = []
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._write)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._is_over.set()
+        self._thread.join()
+
+    def _write(self):
+        with tempfile.TemporaryFile(buffering=0) as file:
+            file.write(bytes(2 * PAGE))
+            os.fsync(file.fileno())
+            begin = time.perf_counter()
+            while not self._is_over.wait(PAUSE):
+                file.seek(0)
+                file.write(os.urandom(PAGE))
+                before = time.perf_counter()
+                os.fdatasync(file.fileno())
+                now = time.perf_counter()
+                self.waits.append((before - begin, 1e3 * (now - before)))
+
+    def parts(self, ends):
+        """Milliseconds in the parts of the time that these are the ends of."""
+        at, waits = np.array(self.waits).T
+        return [part for part in np.split(waits, np.searchsorted(at, ends)) if len(part)]
