@@ -68,7 +68,7 @@ def decorate(painter: Painter, mesh: Mesh) -> None:
     """Glaze, rings, flowers and raised dots."""
     for name, color in (("glaze", GLAZE), ("ornament", None), ("beads", None)):
         painter.operation("add-layer", name=name, **({"color": color} if color else {}))
-    painter.wait()
+    painter.catch_up()
     ornament, beads = (layer["number"] for layer in painter.state["layers"][-2:])
     hand = Decorator(painter, mesh)
     for height, radius, width, color in (
@@ -97,7 +97,7 @@ def photograph(address: str, path: Path) -> None:
         page.wait_for_timeout(8000)
         page.evaluate("meshsdf.viewer.look('front')")
         page.wait_for_timeout(3000)
-        page.mouse.move(480, 430)
+        page.mouse.move(465, 405)
         page.mouse.down(button="right")
         page.mouse.up(button="right")
         page.wait_for_timeout(12000)
