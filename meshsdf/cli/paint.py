@@ -2,7 +2,7 @@
 
 import os
 import webbrowser
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -63,15 +63,17 @@ def command(mesh: str, project: str | None, resolution, port, opens: bool, allow
     from ..server.security import LOOPBACK
     from ..server.static_page import has_page
 
-    with Helper() as helper:
+    with Helper() as helper, ExitStack() as meanwhile:
         with _warming_up(console, helper):
             live, loaded = _opened(console, mesh, project, resolution)
+            meanwhile.callback(live.close)
         if not has_page():
             console.warn(f"the painting page is not here; this command adds it: {COMMAND}")
         if allow_remote:
             console.warn("others on the network can reach this server, and may read what it says")
         place = Place(allow_remote or LOOPBACK, port)
         with _opener(console, opens) as ready:
+            meanwhile.pop_all()  # from here on the server closes it
             paint(live, name=Path(mesh).stem, mesh=loaded, place=place, ready=ready)
     n_steps = plural(live.project.last_seq, "step")
     console.say(f"{live.project.path}: closed, with {n_steps}")
@@ -91,14 +93,15 @@ def _warming_up(console: Console, helper):
 
     def work() -> None:
         try:
-            warm_up(helper)
+            warm_up(Path(folder), helper)
         except (MeshsdfError, OSError) as error:
             troubles.append(f"the first strokes may be slow: {error}")
 
     thread = Thread(target=work, daemon=True)  # of which Ctrl-C need not wait for the end
-    thread.start()
-    yield
-    thread.join()
+    with TemporaryDirectory(prefix="meshsdf-", ignore_cleanup_errors=True) as folder:
+        thread.start()
+        yield
+        thread.join()
     for words in troubles:
         console.warn(words)
 

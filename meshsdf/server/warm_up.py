@@ -41,17 +41,19 @@ CLIENT = "warm-up"
 LEAST_NICE = 10  # of what is compiled beside painting
 
 
-def warm_up(helper: Helper | None = None) -> None:
+def warm_up(folder: Path, helper: Helper | None = None) -> None:
     """Paint on a small ball that nobody sees, in a project of its own.
 
     Parameters
     ----------
+    folder : Path
+        For the project's file, which is left there.
     helper : Helper, optional
         If it has something to compile, this returns when the plain brush is ready, and the rarer
         ones come later.
     """
     helper = helper or Helper()
-    with _ball() as live:
+    with _ball(folder) as live:
         helper.go()
         bricks = WireBricks(live.project.texture)
         feed = Feed(bricks, lambda frame: None)
@@ -65,9 +67,11 @@ def warm_up(helper: Helper | None = None) -> None:
 
 def help_out() -> None:
     """What a helper does: once it is told to go, compile for strokes, and tell when it has."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # leaving no files
+    # Leaving no files; Ctrl-C is for the owner
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.stdin.readline()
-    with _ball() as live:
+    with tempfile.TemporaryDirectory(prefix="meshsdf-") as folder, _ball(Path(folder)) as live:
         with _stroke(live, PLAIN[0]) as go_on:
             go_on()
         with _stroke(live, PLAIN[0]) as go_on:
@@ -85,19 +89,17 @@ def help_out() -> None:
 
 
 @contextlib.contextmanager
-def _ball() -> Iterator[LiveStrokes]:
+def _ball(folder: Path) -> Iterator[LiveStrokes]:
     """A ball with two layers."""
-    ball = icosphere(subdivisions=2)
-    with tempfile.TemporaryDirectory(prefix="meshsdf-") as folder:
-        path = Path(folder) / "ball.mtex"
-        with Project.create(path, ball, resolution=RESOLUTION) as project:
-            for alpha in (1.0, 0.0):
-                project.apply(Operation("add-layer", {"color": [0.5, 0.5, 0.5, alpha]}))
-        live = LiveStrokes.open(path)
-        try:
-            yield live
-        finally:
-            live.close()
+    path, ball = folder / "ball.mtex", icosphere(subdivisions=2)
+    with Project.create(path, ball, resolution=RESOLUTION) as project:
+        for alpha in (1.0, 0.0):
+            project.apply(Operation("add-layer", {"color": [0.5, 0.5, 0.5, alpha]}))
+    live = LiveStrokes.open(path)
+    try:
+        yield live
+    finally:
+        live.close()
 
 
 def _paint(live: LiveStrokes, bricks: WireBricks, brushes: Sequence[Brush]) -> None:

@@ -1,4 +1,8 @@
-"""What the disk alone takes for a page, so that one can tell its own waits from a program's."""
+"""What the disk alone takes for a page, so that one can tell its own waits from a program's.
+
+Pages are due at a steady rate, as dabs are, and a wait counts from when its page is due: what comes
+while the disk stands still waits, too.
+"""
 
 import os
 import tempfile
@@ -8,7 +12,7 @@ import time
 import numpy as np
 
 PAGE = 4096
-PAUSE = 0.1  # seconds
+RATE = 60.0  # pages per second
 
 
 class Disk:
@@ -31,14 +35,13 @@ class Disk:
         with tempfile.TemporaryFile(buffering=0) as file:
             file.write(bytes(2 * PAGE))
             os.fsync(file.fileno())
-            begin = time.perf_counter()
-            while not self._is_over.wait(PAUSE):
+            begin, due = time.perf_counter(), 0.0
+            while not self._is_over.wait(max(0.0, begin + due - time.perf_counter())):
                 file.seek(0)
                 file.write(os.urandom(PAGE))
-                before = time.perf_counter()
                 os.fdatasync(file.fileno())
-                now = time.perf_counter()
-                self.waits.append((before - begin, 1e3 * (now - before)))
+                self.waits.append((due, 1e3 * (time.perf_counter() - begin - due)))
+                due += 1 / RATE
 
     def parts(self, ends):
         """Milliseconds in the parts of the time that these are the ends of."""

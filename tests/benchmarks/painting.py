@@ -8,7 +8,7 @@ python -m tests.benchmarks.painting slow MESH [--seconds 60]
 
 latency  from a dab (60 per second, radius 25 texels) to its acknowledgement, after the commit.
 soak     the same for ten minutes: growth of the server's memory, the first minute, the last, and
-         all between. Beside it what the disk takes for a page in another file: no commit is faster.
+         all between. Beside it what the disk takes for a page in another file, as often.
 storm    a painter whose connection is cut every 200 ms, beside the same strokes without cuts.
 two      two painters at once: what each was sent, and the server's own, by their SHA-256.
 slow     a page that reads a megabit per second while another paints: the server's memory.

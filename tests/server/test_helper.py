@@ -2,12 +2,16 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
+from meshsdf import write_mesh
 from meshsdf.kernels.parallel import n_threads
+from meshsdf.mesh.primitives import icosphere
 
 CODE = """
 import json, os, sys, time
@@ -57,3 +61,25 @@ def test_it_is_stopped_with_its_owner_and_leaves_no_files(tmp_path):
     assert not before
     assert code is not None
     assert left == []
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes")
+def test_ctrl_c_while_a_new_machine_compiles_ends_both_and_leaves_no_files(tmp_path):
+    mesh, kernels, temporary = tmp_path / "ball.obj", tmp_path / "kernels", tmp_path / "temporary"
+    temporary.mkdir()
+    write_mesh(mesh, icosphere(subdivisions=1))
+    env = os.environ | {"TMPDIR": str(temporary), "NUMBA_CACHE_DIR": str(kernels)}
+    command = [sys.executable, "-m", "meshsdf", "paint", str(mesh), "--port", "0"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, env=env, start_new_session=True, **pipes) as process:
+        assert "compiling" in process.stderr.readline()
+        while not list(temporary.iterdir()):
+            time.sleep(0.05)
+        time.sleep(2)  # seconds; the whole takes tens of them
+        os.killpg(process.pid, signal.SIGINT)
+        out, words = process.communicate(timeout=60)
+    assert process.returncode == 130, words
+    assert "interrupted" in words
+    assert not out
+    assert list(temporary.iterdir()) == []
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["ball.obj", "kernels", "temporary"]

@@ -6,6 +6,7 @@ import sys
 
 CODE = """
 import gc, json, sys
+from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 from meshsdf.mesh.primitives import icosphere
 from meshsdf.server.warm_up import PLAIN, RARER, warm_up
@@ -25,7 +26,7 @@ def ready():
     kernels = [one for one in gc.get_objects() if isinstance(one, Dispatcher)]
     return {f"{k.py_func.__name__} {s}" for k in kernels for s in k.signatures}
 
-warm_up()
+warm_up(Path(sys.argv[1]).parent)
 live, bricks = begin(sys.argv[1])
 places = icosphere(subdivisions=2).vertices
 before = ready()
