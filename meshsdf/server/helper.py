@@ -44,7 +44,8 @@ class Helper:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-            self._process.stdin.close()
+            with contextlib.suppress(OSError):  # what it was told may not have got there
+                self._process.stdin.close()
 
     def go(self) -> None:
         """What both processes need is compiled; now let it begin."""
