@@ -65,7 +65,7 @@ def shown_texels(texture: VolumeTexture, slots, entries: Entries, name: str):
     """What a layer of these slots shows in a channel at the texels of entries, (t, 4), and where in
     it each entry's begin."""
     tables = texture.octree.tables
-    first = np.concatenate([[0], np.cumsum(np.diff(tables.texel_first)[entries])])
+    first = texture.octree.texel_rows(entries)
     own, out = np.empty(len(entries), np.int32), np.empty((first[-1], 4), np.float32)
     known_slots(tables, slots, entries, own)
     pool, tiles = texture.pool.use(name), texture.tiles.arrays[name]
@@ -100,7 +100,6 @@ def _compose_bricks(texture, layers, own, entries: Entries, target: Layer) -> No
     names = used_channels(texture)
     pools = {name: texture.pool.use(name) for name in names}
     tables = texture.octree.tables
-    n_texels = np.diff(tables.texel_first)
     n_pieces = max(-(-len(entries) // ENTRIES_PER_PIECE), len(entries) >= FEWEST_FOR_THREADS and 2)
     ranges = even_ranges(len(entries), n_pieces)
 
@@ -116,7 +115,7 @@ def _compose_bricks(texture, layers, own, entries: Entries, target: Layer) -> No
     def work(piece: int) -> None:
         begin, end = ranges[piece]
         part = entries[begin:end]
-        first = np.concatenate([[0], np.cumsum(n_texels[part])])
+        first = texture.octree.texel_rows(part)
         masks = [WHOLE] * len(layers)
         if "mask" in names:
             masks = [shown("mask", i, begin, end, first) for i in range(len(layers))]

@@ -150,6 +150,16 @@ class Octree:
         first = self.tables.texel_first[self.level_first[level : level + 2]]
         return int(first[1] - first[0])
 
+    def texel_counts(self, entries: Entries) -> np.ndarray:
+        """(n,) int64: how many texels each of these entries has; costs O(n)."""
+        first = self.tables.texel_first
+        return first[entries + 1] - first[entries]
+
+    def texel_rows(self, entries: Entries) -> np.ndarray:
+        """(n + 1,) int64: where each entry's texels begin if they lie one after another, and the
+        number of them all."""
+        return _starts(self.texel_counts(entries))
+
     def find(
         self,
         level: int,

@@ -190,7 +190,7 @@ def _old_parts(texture, new, change: MeshChange, entries: Entries) -> Parts | No
         return None
     feet, _ = new.feet(entries)
     numbers = known.face_parts[change.old(feet).face_index].astype(np.int64)
-    counts = np.diff(new.octree.tables.texel_first)[entries]
+    counts = new.octree.texel_counts(entries)
     rows = MOST_NUMBERS * np.repeat(np.arange(len(entries)), counts) + numbers
     votes = np.bincount(rows, minlength=MOST_NUMBERS * len(entries)).reshape(-1, MOST_NUMBERS)
     return np.left_shift(np.int64(1), votes.argmax(axis=1))
@@ -308,8 +308,7 @@ def _stored(texture, new, layer: Layer, level: int, plan: _Plan) -> np.ndarray:
     if level >= min(texture.octree.n_levels, new.octree.n_levels - 1):
         return np.ones(len(plan.entries), bool)
     wanted = (plan.old >= 0) & (layer.slots[plan.old] != ABSENT)
-    first = np.diff(new.octree.tables.texel_first)[plan.entries]
-    row = np.repeat(np.arange(len(first)), first)
+    row = np.repeat(np.arange(len(plan.entries)), new.octree.texel_counts(plan.entries))
     some = np.flatnonzero(~(plan.whole | wanted)[row])
     bricks = np.floor(plan.points[some] / (8 * new.octree.spacing(level))).astype(np.int64)
     found = texture.octree.find(level, bricks, plan.normals[some], plan.parts[some])
@@ -331,10 +330,9 @@ def _copy(texture, new, made: Layer, entries: Entries, before: np.ndarray) -> No
 def _fill(texture, new, layer: Layer, made: Layer, level: int, plan: _Plan, rest, before) -> None:
     """Entries ``plan.entries[rest]``: texels as they are where both have them, else looked up."""
     entries = plan.entries[rest]
-    first = np.diff(new.octree.tables.texel_first)[plan.entries]
-    chosen = np.zeros(len(first), bool)
+    chosen = np.zeros(len(plan.entries), bool)
     chosen[rest] = True
-    chosen = np.repeat(chosen, first)
+    chosen = np.repeat(chosen, new.octree.texel_counts(plan.entries))
     width = new.octree.spacing(level)
     keeps = plan.copied[rest] & (before != ABSENT)[:, None]
     slots = new.writable(made, entries)

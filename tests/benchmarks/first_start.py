@@ -25,7 +25,7 @@ from meshsdf.texture.brush import Brush
 from .alternate import machine
 
 BRUSHES = {"paint": {}, "blur": {"kind": "blur"}, "height": {"channel": "height", "value": 2.0}}
-AGAIN = 25.0  # seconds in which the rarer brushes are compiled
+RARER = 25.0  # seconds in which the rarer brushes are compiled
 
 
 def start(mesh_path, project):
@@ -64,7 +64,7 @@ def main():
         for name in ("first", "again"):
             process, address, wait = start(mesh_path, Path(folder) / f"{name}.mtex")
             print(f"{name} start: ready after {wait:.1f} s; strokes: {strokes(address, mesh)}")
-            time.sleep(AGAIN if name == "first" else 0)
+            time.sleep(RARER if name == "first" else 0)
             process.send_signal(signal.SIGTERM)
             assert process.wait(60) == 0
 

@@ -3,6 +3,7 @@
 import contextlib
 import sqlite3
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -186,3 +187,26 @@ def test_the_log_stays_short_though_no_commit_copies_it(tmp_path, monkeypatch):
                 project.apply(ball(0, 0.01 * n))
             sizes[apart] = path.with_name(f"{path.name}-wal").stat().st_size
     assert sizes[True] < 0.5 * sizes[False]
+
+
+def test_what_is_written_beside_painting_rests_until_somebody_waits_for_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(housekeeping, "REST", 1e9)
+    monkeypatch.setattr(housekeeping, "LONGEST_REST", 600.0)
+    live = fresh(tmp_path)
+    house = housekeeping.Housekeeping(live.project.path, live.project.pending.turn)
+    left = []
+
+    def write(connection):
+        connection.execute("UPDATE op SET t = t + 1")
+        house.rest()
+        left.append(connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone())
+
+    written = house.do(write)
+    time.sleep(0.5)
+    assert not written.done()
+    with house.hurry():
+        written.result(30)
+    _, n_frames, n_copied = left[0]
+    assert n_frames == n_copied
+    house.close()
+    live.close()

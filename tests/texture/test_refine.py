@@ -9,7 +9,7 @@ from meshsdf.mesh.primitives import icosphere
 from meshsdf.mesh.sampling import sample_surface
 from meshsdf.srgb import srgb_rgba
 from meshsdf.texture.mip import bake, update_mips
-from meshsdf.texture.refine import coarsen, refine, refine_to
+from meshsdf.texture.refine import coarsen, refine, refine_to, seen_above, seen_from
 from meshsdf.texture.volume_texture import VolumeTexture
 
 from .texture_twins import ABSENT, half_painted, half_pattern, random_texture
@@ -93,6 +93,18 @@ def test_refining_changes_nothing_where_halves_can_hold_the_values():
     unrefined, _ = coarse_grid_texture("half")
     nodes = np.abs(texture.colors(exact) - unrefined.colors(exact))
     assert nodes.max() == 0
+
+
+@pytest.mark.parametrize("base", ["half", "srgb8"])
+def test_what_is_seen_above_is_what_lookups_give_there(base):
+    texture, layer = coarse_grid_texture(base)
+    refine(texture, layer, entries_left_of(texture, 1, 0.3))
+    for level in (0, 1):
+        entries = np.arange(*texture.octree.level_first[level : level + 2], dtype=np.int32)
+        seen = seen_above(texture, layer, entries, "base")
+        looked_up = seen_from(texture, layer, entries, "base", level + 1)
+        assert np.ptp(looked_up) > 0.9
+        np.testing.assert_allclose(seen, looked_up, rtol=0, atol=5e-7)
 
 
 def test_refining_changes_eight_bit_colours_by_half_a_step_over_all_levels_at_once():
